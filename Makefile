@@ -1,0 +1,45 @@
+# Every verb makes .venv and installs what it needs by itself; Python 3.11 or newer is all that must be there.
+
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+VENV   := .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint constraints.txt
+# Slow proofs run in CI; `make test MARKS=` runs them here.
+MARKS  ?= $(if $(CI),,-m "not slow")
+
+.PHONY: help run test lint types bench clean
+.DEFAULT_GOAL := help
+
+help: ## what there is to say
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+
+run: $(VENV)/serve.stamp ## start the service, stream a sample to it, show the live meter
+	@$(BIN)/fervor demo
+
+test: $(VENV)/dev.stamp ## run the tests
+	@$(BIN)/python -m pytest $(MARKS)
+
+lint: $(VENV)/dev.stamp ## style, format, and the floors of the architecture
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/lint-imports
+
+types: $(VENV)/dev.stamp ## mypy --strict on the three packages
+	@$(BIN)/mypy
+
+bench: $(VENV)/dev.stamp ## speed, as ratios measured in one run
+	@$(BIN)/python -m bench
+
+clean: ## forget the environment and everything made
+	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "fervor needs Python 3.11 or newer; none was found (PYTHON=... names one)" >&2; exit 69; }
+	@$(PYTHON) -m venv $(VENV) || { echo "$(PYTHON) can't make a virtual environment; on Debian and Ubuntu: apt install python3-venv" >&2; exit 69; }
+
+$(VENV)/%.stamp: pyproject.toml constraints.txt | $(BIN)/python
+	@echo "installing fervor[$*] into $(VENV) ..."
+	@$(PIP) --editable '.[$*]'
+	@touch $@
