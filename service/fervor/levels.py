@@ -1,0 +1,44 @@
+"""Intensity to level: a threshold per emotion with hysteresis and dwell, a pure function of intensities and times."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Level(StrEnum):
+    """How strongly an emotion shows: weak below the threshold, strong from it on."""
+
+    WEAK = "weak"
+    STRONG = "strong"
+
+
+@dataclass(frozen=True, slots=True)
+class LevelState:
+    """The level of one body, and since when."""
+
+    level: Level
+    since: float  # seconds, client clock
+
+
+def next_level(
+    state: LevelState | None,
+    *,
+    intensity: float,
+    time: float,
+    threshold: float,
+    hysteresis: float,
+    dwell: float,
+) -> LevelState:
+    """The level after an intensity in [0, 1] at `time` (seconds, client clock).
+
+    A level changes only when the intensity leaves the band `threshold` ± `hysteresis` on the other side and the level
+    has been held for `dwell` seconds. The first estimate takes its side of the threshold at once.
+    """
+    if state is None:
+        return LevelState(Level.STRONG if intensity >= threshold else Level.WEAK, time)
+    if time - state.since < dwell:
+        return state
+    if state.level is Level.WEAK and intensity >= threshold + hysteresis:
+        return LevelState(Level.STRONG, time)
+    if state.level is Level.STRONG and intensity < threshold - hysteresis:
+        return LevelState(Level.WEAK, time)
+    return state

@@ -1,0 +1,1 @@
+"""Wire protocol v1: messages, their encodings, and the poses inside them. No I/O."""

@@ -1,0 +1,88 @@
+"""Bytes to messages and back. One codec per subprotocol; a codec knows nothing of what was said before."""
+
+import re
+from collections.abc import Mapping
+from typing import Protocol, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from fervor.errors import MessageError
+from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
+
+_CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
+_SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
+
+
+_Message = TypeVar("_Message")
+
+
+class Codec(Protocol):
+    """One encoding of the protocol."""
+
+    subprotocol: str
+    """As negotiated in Sec-WebSocket-Protocol."""
+
+    def decode_client(self, data: str | bytes) -> ClientMessage:
+        """A message from the client; raises MessageError."""
+
+    def decode_server(self, data: str | bytes) -> ServerMessage:
+        """A message from the service; raises MessageError."""
+
+    def encode(self, message: ClientMessage | ServerMessage) -> str | bytes:
+        """The message as one WebSocket frame's payload."""
+
+
+class JsonCodec:
+    """`fervor.v1.json`: one JSON object a text frame."""
+
+    subprotocol = f"{PROTOCOL}.json"
+
+    def decode_client(self, data: str | bytes) -> ClientMessage:
+        """A message from the client; raises MessageError saying which field is wrong and what was expected."""
+        return self._decode(_CLIENT, data)
+
+    def decode_server(self, data: str | bytes) -> ServerMessage:
+        """A message from the service; raises MessageError."""
+        return self._decode(_SERVER, data)
+
+    def encode(self, message: ClientMessage | ServerMessage) -> str:
+        """The message as JSON text; fields that say nothing are left out."""
+        return message.model_dump_json(exclude_none=message.type not in KEEP_NULLS)
+
+    @staticmethod
+    def _decode(adapter: TypeAdapter[_Message], data: str | bytes) -> _Message:
+        if isinstance(data, bytes):
+            raise MessageError(f"{JsonCodec.subprotocol} takes text messages, but {len(data)} bytes of binary came")
+        try:
+            return adapter.validate_json(data, strict=True)
+        except ValidationError as error:
+            raise MessageError(one_sentence(error)) from None
+
+
+KEEP_NULLS = frozenset({"estimate", "estimates", "frame", "frames"})
+"""Messages in which null means something: no intensity yet, a joint not tracked."""
+
+CODECS: Mapping[str, Codec] = {codec.subprotocol: codec for codec in (JsonCodec(),)}
+"""All codecs by subprotocol."""
+
+
+def one_sentence(error: ValidationError) -> str:
+    """The first complaint of a pydantic error as one sentence: where, what, and what came."""
+    first = error.errors(include_url=False, include_context=False)[0]
+    problem = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "json_invalid":
+        return f"the message is not JSON: {problem.removeprefix('Invalid JSON: ')}"
+    place = _place(first["loc"])
+    if first["type"] == "extra_forbidden":
+        return f"{place} is not a field of this message"
+    if first["type"] == "missing":
+        return f"{place} is missing"
+    if first["type"].startswith("union_tag"):
+        return f"the message's type is not known: {problem}"
+    came = repr(first["input"])
+    return f"{place}: {problem[0].lower()}{problem[1:]}, but {came if len(came) <= 60 else came[:57] + '...'} came"
+
+
+def _place(loc: tuple[int | str, ...]) -> str:
+    parts = [str(part) for part in loc if not re.match(r"^(tuple|dict|str|function|constrained)\b", str(part))]
+    return ".".join(parts) or "the message"

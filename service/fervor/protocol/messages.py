@@ -1,0 +1,229 @@
+"""The messages of `GET /v1/stream`, as they stand on the wire.
+
+A client opens with `session.start`, then sends frames; the service answers every frame with one estimate. All times are
+seconds on the client's clock, all intensities lie in [0, 1] and mean the share of observers expected to recognise the
+emotion. Unknown fields are refused, so that a misspelt option is told and not ignored.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from fervor.levels import Level
+from fervor.skeletons.skeleton import Axes, QuaternionOrder
+
+PROTOCOL = "fervor.v1"
+"""Name and major version; a subprotocol adds the encoding: `fervor.v1.json`."""
+
+BodyId = Annotated[str, StringConstraints(min_length=1, max_length=64)]
+"""The client's name for a tracked person, unique in its session."""
+
+EmotionLabel = Annotated[str, StringConstraints(max_length=32)]
+
+Emotion = EmotionLabel | dict[EmotionLabel, float]
+"""A label, or a probability per emotion as face analysers give it."""
+
+Clock = Literal["time", "frames"]
+"""`time`: poses are put on the model's grid by their `t`; `frames`: each frame is one step."""
+
+Delivery = Literal["every", "latest"]
+"""`every`: one estimate a frame; `latest`: only the newest of a body where several are ready together."""
+
+Memory = Literal["staggered", "stateful"]
+"""`staggered`: two states restarted in turn, for streams of any length; `stateful`: one state, as in the paper."""
+
+Status = Literal["warming_up", "ok", "insufficient"]
+"""Whether to trust an estimate: too early, yes, or too few joints seen."""
+
+Flag = Literal[
+    "between_steps", "interpolated", "held", "gap_reset", "clock_reset", "reset", "late", "duplicate", "jump", "lost"
+]
+"""What happened to a frame on its way: see docs/reference/protocol.md."""
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
+
+
+# --- client → service -------------------------------------------------------------------------------------------------
+
+
+class SessionStart(_Message):
+    """Opens the conversation: what the client will send, and what it wants back."""
+
+    type: Literal["session.start"] = "session.start"
+    skeleton: str = Field("c13", description="name from /v1/skeletons")
+    axes: Axes | None = Field(None, description="default: what the skeleton's sensor gives")
+    quaternion: QuaternionOrder | None = Field(None, description="default: what the skeleton's sensor gives")
+    joints: tuple[str, ...] | None = Field(None, description="joints sent, in this order; others count as untracked")
+    nominal_hz: float | None = Field(None, gt=0, le=1000, description="the sensor's rate; used by clock `frames`")
+    clock: Clock = "time"
+    delivery: Delivery = "every"
+    memory: Memory = "staggered"
+    emotion: Emotion | None = Field(None, description="label of new bodies until a frame brings one")
+    emotion_ttl_s: float | None = Field(
+        None, gt=0, description="seconds a label holds; default: for ever, probabilities 2 s"
+    )
+    by_emotion: bool = Field(default=False, description="estimates carry the intensity under every emotion too")
+    resume: tuple[str, ...] = Field((), description="checkpoint tokens to go on from")
+
+
+Quaternion = Annotated[tuple[float, float, float, float], Field(description="zero or null means untracked")]
+
+
+class Frame(_Message):
+    """One timestamped pose of one body."""
+
+    type: Literal["frame"] = "frame"
+    body: BodyId = "0"
+    seq: int = Field(ge=0, le=2**53, description="rises by one or more from frame to frame")
+    t: float | None = Field(None, allow_inf_nan=False, description="seconds, client clock; needed by clock `time`")
+    q: tuple[Quaternion | None, ...] = Field(description="one quaternion a joint; null where untracked")
+    mask: tuple[bool, ...] | None = Field(None, description="false where untracked")
+    emotion: Emotion | None = Field(None, description="a new label; absent: the old one holds; `unknown` clears it")
+
+
+class Frames(_Message):
+    """Several frames in one message, answered by one `estimates`."""
+
+    type: Literal["frames"] = "frames"
+    frames: tuple[Frame, ...] = Field(min_length=1)
+
+
+class BodyReset(_Message):
+    """Forget what a body did so far; its next frame is a first one."""
+
+    type: Literal["body.reset"] = "body.reset"
+    body: BodyId
+
+
+class BodyEnd(_Message):
+    """A body is gone; its state is freed."""
+
+    type: Literal["body.end"] = "body.end"
+    body: BodyId
+
+
+class Ping(_Message):
+    """Asks for a pong, through the same queue as frames' errors."""
+
+    type: Literal["ping"] = "ping"
+    id: str | None = None
+
+
+class SessionEnd(_Message):
+    """No more frames; the service answers what is under way, then `session.ended`."""
+
+    type: Literal["session.end"] = "session.end"
+
+
+ClientMessage = Annotated[
+    SessionStart | Frame | Frames | BodyReset | BodyEnd | Ping | SessionEnd, Field(discriminator="type")
+]
+
+
+# --- service → client -------------------------------------------------------------------------------------------------
+
+
+class ModelInfo(_Message):
+    """The model that will answer."""
+
+    name: str
+    version: str
+    purpose: Literal["demo", "research"] = Field(description="`demo`: procedural training data, not science")
+    sha256: str
+    rate_hz: float
+    emotions: tuple[str, ...]
+    thresholds: Mapping[str, float]
+
+
+class Limits(_Message):
+    """What the service takes from one session; more is refused with an error."""
+
+    max_message_bytes: int = 1_048_576
+    max_bodies: int = 16
+    max_frames_per_message: int = 1024
+    max_frames_per_second: float = 2000.0
+    start_timeout_s: float = 10.0
+    idle_timeout_s: float = 60.0
+    body_idle_s: float = 10.0
+
+
+class SessionStarted(_Message):
+    """The answer to `session.start`."""
+
+    type: Literal["session.started"] = "session.started"
+    session_id: str
+    protocol: str = PROTOCOL
+    model: ModelInfo
+    limits: Limits
+    joints: tuple[str, ...] = Field(description="joints expected in every frame, in this order")
+    fingerprint: str = Field(description="runtime whose estimates are equal to the bit")
+
+
+class Estimate(_Message):
+    """The answer to one frame."""
+
+    type: Literal["estimate"] = "estimate"
+    body: str
+    seq: int
+    t: float
+    intensity: float | None = Field(
+        description="share of observers expected to recognise the emotion; null: no pose yet"
+    )
+    level: Level | None
+    emotion: str = Field(description="the label in force, or `unknown`")
+    status: Status
+    flags: tuple[Flag, ...] = ()
+    by_emotion: Mapping[str, float] | None = None
+
+
+class Estimates(_Message):
+    """The answer to `frames`."""
+
+    type: Literal["estimates"] = "estimates"
+    estimates: tuple[Estimate, ...]
+
+
+class Pong(_Message):
+    """The answer to `ping`."""
+
+    type: Literal["pong"] = "pong"
+    id: str | None = None
+
+
+class Error(_Message):
+    """A sentence on what went wrong; after a fatal one the service closes."""
+
+    type: Literal["error"] = "error"
+    code: str
+    message: str
+    fatal: bool
+    body: str | None = None
+    seq: int | None = None
+    retry_after: float | None = None
+
+
+class Totals(_Message):
+    """What a session came to."""
+
+    frames: int = 0
+    estimates: int = 0
+    late: int = 0
+    duplicate: int = 0
+    rejected: int = 0
+    resets: int = 0
+
+
+class SessionEnded(_Message):
+    """The last message of a conversation."""
+
+    type: Literal["session.ended"] = "session.ended"
+    reason: str
+    totals: Totals
+
+
+ServerMessage = Annotated[
+    SessionStarted | Estimate | Estimates | Pong | Error | SessionEnded, Field(discriminator="type")
+]

@@ -1,0 +1,51 @@
+"""Hysteresis and dwell."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fervor.levels import Level, LevelState, next_level
+
+RULE = {"threshold": 0.5, "hysteresis": 0.05, "dwell": 1.0}
+
+
+def run(values, dt=0.1):
+    state, levels = None, []
+    for index, value in enumerate(values):
+        state = next_level(state, intensity=value, time=index * dt, **RULE)
+        levels.append(state.level)
+    return levels
+
+
+def test_first_takes_its_side_at_once():
+    assert run([0.5]) == [Level.STRONG]
+    assert run([0.49]) == [Level.WEAK]
+
+
+def test_noise_inside_the_band_changes_nothing():
+    assert set(run([0.4] + [0.54, 0.46] * 40)) == {Level.WEAK}
+
+
+def test_a_clear_change_waits_for_the_dwell():
+    levels = run([0.2, *[0.9] * 20])
+    assert levels.index(Level.STRONG) == 10
+
+
+def test_falling_needs_the_lower_edge():
+    assert run([0.9] * 15 + [0.46] * 15)[-1] is Level.STRONG
+    assert run([0.9] * 15 + [0.44] * 15)[-1] is Level.WEAK
+
+
+@given(st.lists(st.floats(0, 1), min_size=2, max_size=200))
+def test_changes_are_never_closer_than_the_dwell(values):
+    state, changes = None, []
+    for index, value in enumerate(values):
+        following = next_level(state, intensity=value, time=index / 30, **RULE)
+        if state is not None and following.level is not state.level:
+            changes.append(index / 30)
+        state = following
+    assert all(b - a >= RULE["dwell"] - 1e-9 for a, b in zip(changes, changes[1:], strict=False))
+
+
+def test_level_values_are_the_wire_words():
+    assert LevelState(Level.WEAK, 0.0).level == "weak"
+    assert Level.STRONG == "strong"

@@ -1,0 +1,57 @@
+"""Bad bytes get one clear sentence."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fervor.errors import MessageError
+from fervor.protocol.codec import JsonCodec
+from fervor.protocol.messages import Estimate, Frame
+
+CODEC = JsonCodec()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("{", "the message is not JSON: EOF"),
+        ("[]", "should be an object"),
+        ('{"type":"x"}', "type is not known"),
+        ("{}", "type"),
+        ('{"type":"session.start","skeletn":"c13"}', "session.start.skeletn is not a field of this message"),
+        ('{"type":"frame","t":0,"q":[]}', "frame.seq is missing"),
+        ('{"type":"frame","seq":"3","t":0,"q":[]}', "frame.seq: input should be a valid integer, but '3' came"),
+        ('{"type":"frame","seq":-1,"t":0,"q":[]}', "greater than or equal to 0, but -1 came"),
+        ('{"type":"frame","seq":1,"t":0,"q":[[1,2,3]]}', "frame.q.0.3 is missing"),
+        ('{"type":"frame","seq":1,"t":NaN,"q":[]}', "frame.t: input should be a finite number"),
+        ('{"type":"frame","seq":1,"t":1,"q":[],"emotion":3}', "frame.emotion"),
+        ('{"type":"frames","frames":[]}', "at least 1 item"),
+        ('{"type":"body.reset","body":""}', "at least 1 character"),
+        ("\ud800", "unable to parse raw data as a unicode string"),
+    ],
+)
+def test_one_sentence_names_the_field(text, told):
+    with pytest.raises(MessageError) as caught:
+        CODEC.decode_client(text)
+    assert told in caught.value.message
+    assert "\n" not in caught.value.message
+    assert len(caught.value.message) < 300
+
+
+def test_binary_on_the_text_subprotocol_is_told():
+    with pytest.raises(MessageError, match="takes text messages, but 3 bytes of binary came"):
+        CODEC.decode_client(b"{} ")
+
+
+@given(st.text(max_size=200))
+def test_no_text_raises_anything_else(text):
+    try:
+        CODEC.decode_client(text)
+    except MessageError as error:
+        assert "\n" not in error.message
+
+
+def test_nulls_that_mean_something_are_kept():
+    estimate = Estimate(body="0", seq=1, t=0.0, intensity=None, level=None, emotion="joy", status="insufficient")
+    assert '"intensity":null' in CODEC.encode(estimate)
+    assert "null" in CODEC.encode(Frame(seq=1, t=0.0, q=(None,)))

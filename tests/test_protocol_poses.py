@@ -1,0 +1,46 @@
+"""The gate through which poses enter."""
+
+import numpy as np
+import pytest
+
+from fervor.errors import FrameError
+from fervor.protocol.messages import Frame
+from fervor.protocol.poses import frame_pose
+
+JOINTS = ("a", "b", "c")
+UNIT = (0.0, 0.0, 0.0, 1.0)
+
+
+def frame(*q, mask=None):
+    return Frame(body="eve", seq=7, t=0.0, q=q, mask=mask)
+
+
+def test_order_on_the_wire():
+    rotations, observed = frame_pose(frame((1.0, 0.0, 0.0, 0.0), UNIT, UNIT), JOINTS, "wxyz")
+    assert rotations[0].tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert rotations.dtype == np.float64
+    assert observed.all()
+
+
+def test_null_zero_short_and_masked_are_untracked_not_wrong():
+    _, observed = frame_pose(frame(None, (0.0, 0.0, 0.0, 0.0), (0.0, 0.3, 0.0, 0.2)), JOINTS, "xyzw")
+    assert not observed.any()
+    _, observed = frame_pose(frame(UNIT, UNIT, UNIT, mask=(True, False, True)), JOINTS, "xyzw")
+    assert observed.tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("bad", "told"),
+    [
+        (frame(UNIT), "has 1 joints in q; expected 3"),
+        (frame(UNIT, UNIT, UNIT, mask=(True,)), "has 1 entries in mask; expected 3"),
+        (frame(UNIT, (0.0, float("nan"), 0.0, 1.0), UNIT), r"at joint 1 \(b\); expected four finite numbers"),
+        (frame(UNIT, UNIT, (float("inf"), 0.0, 0.0, 1.0)), r"at joint 2 \(c\); expected four finite numbers"),
+        (frame(UNIT, UNIT, (1e300, 0.0, 0.0, 1.0)), r"far from unit length at joint 2 \(c\)"),
+    ],
+)
+def test_poison_is_refused_whole_naming_the_joint(bad, told):
+    with pytest.raises(FrameError, match=told) as caught:
+        frame_pose(bad, JOINTS, "xyzw")
+    assert caught.value.message.startswith("frame 7 of body 'eve' ")
+    assert (caught.value.body, caught.value.seq) == ("eve", 7)
