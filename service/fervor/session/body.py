@@ -1,0 +1,177 @@
+"""One tracked person: from a frame to the work it brings, from that work's outcome to an estimate.
+
+A body holds scalars only; its recurrent tensors and poses live in the engine under its slot.
+"""
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fervor.emotions import EMOTIONS, UNKNOWN
+from fervor.levels import LevelState, next_level
+from fervor.metadata import ModelMetadata
+from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
+from fervor.session.events import Outcome, Pose, Source, Step, Ticket
+from fervor.session.label import NO_LABEL, Label, make_label
+from fervor.session.lanes import schedule
+from fervor.session.timeline import Advance, Instant, Timeline, advance, count_frame
+from fervor.skeletons.rig import UPPER_BODY
+
+WARM_UP_S = 1.0
+"""Seconds after a reset in which an estimate rests on too little motion."""
+
+ENOUGH_JOINTS = 0.6
+"""Share of the upper-body joints its sensor can see that a frame must show."""
+
+REMEMBERED = 64
+"""Estimates kept to answer duplicates."""
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What a session agreed on, for all its bodies."""
+
+    metadata: ModelMetadata
+    source: Source
+    clock: Clock = "time"
+    memory: Memory = "staggered"
+    emotion_ttl_s: float | None = None
+    by_emotion: bool = False
+
+
+class Body:
+    """The bookkeeping of one body, driven by its frames alone."""
+
+    def __init__(self, name: str, slot: int, terms: Terms, label: Label = NO_LABEL) -> None:
+        self.name = name
+        self.slot = slot
+        self.in_flight = 0
+        self.newest_seq = -1
+        self._terms = terms
+        self._label = label
+        self._timeline: Timeline | None = None
+        self._last: float | None = None  # seconds, newest frame with a pose or without
+        self._level: LevelState | None = None
+        self._emotion = UNKNOWN
+        self._pending: tuple[Flag, ...] = ()
+        self._answers: OrderedDict[int, Estimate] = OrderedDict()
+        seen = terms.source.skeleton.sees
+        self._enough = ENOUGH_JOINTS * sum(seen[joint] for joint in UPPER_BODY)
+
+    @property
+    def last(self) -> float | None:
+        """Time of its newest frame, seconds on the client's clock."""
+        return self._last
+
+    def reset(self, flag: Flag = "reset") -> None:
+        """Forget poses, states and level; the next frame is a first one and says so."""
+        self._timeline = None
+        self._level = None
+        self._pending = (flag,)
+
+    def answered(self, seq: int) -> Estimate | None:
+        """The estimate a duplicate of frame `seq` gets again; None if it is under way or forgotten."""
+        estimate = self._answers.get(seq)
+        return estimate and estimate.model_copy(update={"flags": (*estimate.flags, "duplicate")})
+
+    def plan(
+        self,
+        seq: int,
+        time: float,
+        pose: Pose,
+        *,
+        emotion: str | Mapping[str, float] | None = None,
+        group: int | None = None,
+    ) -> Ticket:
+        """The work that frame `seq` at `time` (seconds) brings.
+
+        Raises:
+            InputError: an emotion that is not known; the frame then left no trace.
+        """
+        if emotion is not None:
+            self._label = make_label(emotion, time, self._terms.emotion_ttl_s)
+        late = seq <= self.newest_seq
+        lost = not bool(pose.observed.any())
+        fresh = self._timeline is None
+        moved = self._move(time, late=late, lost=lost)
+        self.newest_seq = max(seq, self.newest_seq)
+        if "late" not in moved.flags:
+            self._last = time
+        flags: tuple[Flag, ...] = moved.flags
+        if moved.fresh:
+            flags, self._pending, self._level = (*self._pending, *flags), (), None
+        if lost:
+            flags = (*flags, "lost")
+        self._timeline = moved.timeline
+        self.in_flight += 1
+        return Ticket(
+            slot=self.slot,
+            body=self.name,
+            seq=seq,
+            time=time,
+            source=self._terms.source,
+            pose=None if lost or "late" in flags else pose,
+            fresh=fresh or moved.fresh,
+            steps=tuple(map(self._step, moved.instants)),
+            flags=flags,
+            since=moved.timeline.origin if moved.timeline else time,
+            group=group,
+        )
+
+    def conclude(self, ticket: Ticket, outcome: Outcome) -> Estimate:
+        """The estimate for a ticket, in the order in which tickets were planned."""
+        self.in_flight -= 1
+        if ticket.steps:
+            self._emotion = ticket.steps[-1].label.name
+        if ticket.steps and outcome.intensity is not None:
+            self._level = self._next_level(outcome.intensity, ticket.time)
+        estimate = Estimate(
+            body=self.name,
+            seq=ticket.seq,
+            t=ticket.time,
+            intensity=outcome.intensity,
+            level=self._level.level if self._level and outcome.intensity is not None else None,
+            emotion=self._emotion,
+            status=self._status(ticket, outcome),
+            flags=(*ticket.flags, "jump") if outcome.jumped else ticket.flags,
+            by_emotion=self._by_emotion(outcome),
+        )
+        self._answers.setdefault(ticket.seq, estimate)  # a late copy of a frame under way must not replace its answer
+        if len(self._answers) > REMEMBERED:
+            self._answers.popitem(last=False)
+        return estimate
+
+    def _move(self, time: float, *, late: bool, lost: bool) -> Advance:
+        """Where the frame stands in time; a late or empty one moves nothing."""
+        if late:
+            return Advance(self._timeline, flags=("late",))
+        if lost:
+            return Advance(self._timeline)
+        if self._terms.clock == "frames":
+            return count_frame(self._timeline, time)
+        return advance(self._timeline, time, rate_hz=self._terms.metadata.rate_hz)
+
+    def _step(self, instant: Instant) -> Step:
+        lanes = schedule(self._terms.memory, instant.index, self._terms.metadata.rate_hz)
+        return Step(instant.fraction, instant.held, lanes, self._label.at(instant.time))
+
+    def _next_level(self, intensity: float, time: float) -> LevelState:
+        rule = self._terms.metadata.levels
+        return next_level(
+            self._level,
+            intensity=intensity,
+            time=time,
+            threshold=rule.threshold[self._emotion],
+            hysteresis=rule.hysteresis,
+            dwell=rule.dwell_s,
+        )
+
+    def _status(self, ticket: Ticket, outcome: Outcome) -> Status:
+        if "lost" in ticket.flags or outcome.seen < self._enough:
+            return "insufficient"
+        return "warming_up" if ticket.time - ticket.since < WARM_UP_S else "ok"
+
+    def _by_emotion(self, outcome: Outcome) -> dict[str, float] | None:
+        if not self._terms.by_emotion or outcome.intensity is None:
+            return None
+        return dict(zip(EMOTIONS, outcome.by_emotion.tolist(), strict=True))

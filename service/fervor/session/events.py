@@ -1,0 +1,101 @@
+"""What a session asks its edge to do, and what the engine tells it back. Values only.
+
+Data flows one way: message → session → `Ticket` → engine → `Outcome` → session → `Reply`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fervor.errors import CloseCode
+from fervor.protocol.messages import Flag, ServerMessage
+from fervor.session.label import Label
+from fervor.session.lanes import Schedule
+from fervor.skeletons.skeleton import Axes, Skeleton
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """Send this message, after all earlier ones."""
+
+    message: ServerMessage
+
+
+@dataclass(frozen=True, slots=True)
+class Close:
+    """Close the connection, after all earlier messages."""
+
+    code: CloseCode
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Give the slot back to the engine, after all earlier tickets."""
+
+    slot: int
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What kind of rotations a session sends; poses of equal sources are adapted together."""
+
+    skeleton: Skeleton
+    axes: Axes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """The rotations of one frame in the order of its source's joints."""
+
+    rotations: npt.NDArray[np.float64]  # [joint, 4] xyzw
+    observed: npt.NDArray[np.bool_]  # [joint]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One model evaluation of a body."""
+
+    fraction: float
+    """Where between the body's pose before (0) and this ticket's (1)."""
+    held: bool
+    """The pose before stays, unobserved."""
+    schedule: Schedule
+    label: Label
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ticket:
+    """The work that one frame brings; answered by one `Outcome`."""
+
+    slot: int
+    body: str
+    seq: int
+    time: float  # seconds, client clock
+    source: Source
+    pose: Pose | None
+    """None where no joint was seen or the frame came late: nothing is to be computed."""
+    fresh: bool
+    """Nothing was before: the slot is cleared first."""
+    steps: tuple[Step, ...]
+    flags: tuple[Flag, ...]
+    since: float  # seconds, time of the last reset
+    group: int | None = None
+    """The `frames` message it came in."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What the engine made of a ticket."""
+
+    intensity: float | None
+    """Of the last step so far, in [0, 1]; None before the first."""
+    by_emotion: npt.NDArray[np.float64]  # [emotion]
+    seen: int
+    """Upper-body joints of the rig observed in this frame."""
+    jumped: int
+    """Joints whose rotation was rejected as a jump."""
+
+
+Event = Reply | Close | Release | Ticket

@@ -1,0 +1,59 @@
+"""Lanes: the recurrent states a body keeps side by side, so that a stream may last for hours.
+
+A network trained on clips of seconds must not run for minutes on one state. `staggered` keeps two lanes, each
+restarted every `PERIOD_S`, half a period apart; the older one speaks, and hands over in a cross-fade of `FADE_S` that
+ends where it restarts. `stateful` is the paper's: one lane, never restarted.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+from fervor.protocol.messages import Memory
+
+LANES = 2
+"""Most lanes any kind of memory needs."""
+
+PERIOD_S = 8.0
+FADE_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class LaneStep:
+    """What one lane does in one step."""
+
+    lane: int
+    restart: bool
+    """Its state is zero before this step."""
+    weight: float
+    """Its share of the estimate; the shares of a step add up to 1."""
+
+
+Schedule = tuple[LaneStep, ...]
+
+_ALONE: Schedule = (LaneStep(0, restart=False, weight=1.0),)
+
+
+def schedule(memory: Memory, index: int, rate_hz: float) -> Schedule:
+    """The lanes that run in step `index` since the reset (index 0 restarts lane 0)."""
+    if memory == "stateful":
+        return (LaneStep(0, restart=True, weight=1.0),) if index == 0 else _ALONE
+    opening, cycle = _staggered(rate_hz)
+    return opening[index] if index < len(opening) else cycle[index % len(cycle)]
+
+
+@cache
+def _staggered(rate_hz: float) -> tuple[tuple[Schedule, ...], tuple[Schedule, ...]]:
+    """The first period, in which lane 1 is still to come, and every later one."""
+    half = max(round(PERIOD_S * rate_hz / 2), 1)  # steps
+    fade = min(round(FADE_S * rate_hz), half - 1)
+    opening: list[Schedule] = [(LaneStep(0, restart=index == 0, weight=1.0),) for index in range(half)]
+    opening += [_pair(index, half, fade) for index in range(half, 2 * half)]
+    return tuple(opening), tuple(_pair(index, half, fade) for index in range(2 * half))
+
+
+def _pair(index: int, half: int, fade: int) -> Schedule:
+    elder = 0 if index >= half else 1
+    until_restart = half - index % half  # steps
+    younger_share = max(fade + 1 - until_restart, 0) / (fade + 1)
+    weights = (1.0 - younger_share, younger_share) if elder == 0 else (younger_share, 1.0 - younger_share)
+    return (LaneStep(0, index == 0, weights[0]), LaneStep(1, index == half, weights[1]))

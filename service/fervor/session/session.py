@@ -1,0 +1,300 @@
+"""One conversation: messages in, events out. The edge carries them out in order and brings outcomes back.
+
+The caller's duties: hand every message to `receive` (or, if it could not be decoded, its error to `refuse`); submit
+every `Ticket` to the engine in order and hand each outcome to `conclude`; call `lost` once when the connection is gone.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fervor.errors import CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
+from fervor.metadata import ModelMetadata
+from fervor.protocol.messages import (
+    BodyEnd,
+    BodyReset,
+    ClientMessage,
+    Error,
+    Estimate,
+    Estimates,
+    Frame,
+    Frames,
+    Limits,
+    ModelInfo,
+    Ping,
+    Pong,
+    SessionEnd,
+    SessionEnded,
+    SessionStart,
+    SessionStarted,
+    Totals,
+)
+from fervor.protocol.poses import frame_pose
+from fervor.session.body import Body
+from fervor.session.events import Close, Event, Outcome, Pose, Release, Reply, Ticket
+from fervor.session.label import NO_LABEL, make_label
+from fervor.session.start import Agreement, agree
+from fervor.session.state import SessionState, transition
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """What a session must know of the service it runs in."""
+
+    model: ModelInfo
+    metadata: ModelMetadata
+    limits: Limits
+    fingerprint: str
+    claim: Callable[[], int]
+    """Takes a free slot of the engine; raises Overloaded."""
+
+
+@dataclass(slots=True)
+class _Group:
+    """The answers to one `frames` message, gathered."""
+
+    waiting: int = 0
+    estimates: dict[int, Estimate] = field(default_factory=dict)  # position in the message → answer
+
+
+class Session:
+    """One client's conversation and its bodies."""
+
+    def __init__(self, session_id: str, host: Host) -> None:
+        self.session_id = session_id
+        self.state = SessionState.NEW
+        self._host = host
+        self._agreement: Agreement | None = None
+        self._bodies: dict[str, Body] = {}
+        self._spare: list[int] = []
+        """Slots of forgotten bodies, for the next new one."""
+        self._tickets: dict[Ticket, tuple[Body, int]] = {}  # under way → its body, its place in the group
+        self._groups: dict[int, _Group] = {}
+        self._next_group = 0
+        self._totals = Totals().model_dump()
+
+    @property
+    def totals(self) -> Totals:
+        """What the session came to so far."""
+        return Totals(**self._totals)
+
+    def receive(self, message: ClientMessage) -> list[Event]:
+        """What a message brings. Errors come back as replies; a fatal one is followed by `Close`."""
+        try:
+            self.state = transition(self.state, message.type)
+            return self._dispatch(message)
+        except FervorError as error:
+            return self.refuse(error)
+
+    def refuse(self, error: FervorError) -> list[Event]:
+        """Tell the client of an error; end the session where it is fatal, or where it never began."""
+        if self.state is SessionState.CLOSED:
+            return []
+        if not error.fatal and self.state is SessionState.NEW:
+            error = ProtocolError(f"the session could not start: {error.message}")
+        reply = Reply(_error(error))
+        return [reply, *self._close(error.close_code, error.code)] if error.close_code else [reply]
+
+    def conclude(self, ticket: Ticket, outcome: Outcome | EngineError) -> list[Event]:
+        """What a ticket's outcome brings: its estimate, or the error of a failed run, and a waiting end."""
+        entry = self._tickets.pop(ticket, None)
+        if entry is None or self.state is SessionState.CLOSED:
+            return []
+        body, place = entry
+        events = self._fail(ticket, body, outcome) if isinstance(outcome, EngineError) else []
+        estimate = None if isinstance(outcome, EngineError) else body.conclude(ticket, outcome)
+        if estimate is not None:
+            self._count("estimates")
+        events += self._answer(ticket.group, place, estimate, superseded=self._superseded(body))
+        if self.state is SessionState.ENDING and not self._tickets:
+            events += self._ended("ended by the client")
+        return events
+
+    def lost(self) -> list[Event]:
+        """The connection is gone: free what the session holds."""
+        if self.state is SessionState.CLOSED:
+            return []
+        self.state = SessionState.CLOSED
+        return self._release_all()
+
+    def _dispatch(self, message: ClientMessage) -> list[Event]:
+        match message:
+            case SessionStart():
+                return self._start(message)
+            case Frame():
+                return self._frame(message)
+            case Frames():
+                return self._frames(message)
+            case BodyReset():
+                self._body(message.body).reset()
+                self._count("resets")
+                return []
+            case BodyEnd():
+                return self._end_body(self._body(message.body))
+            case Ping():
+                return [Reply(Pong(id=message.id))]
+            case SessionEnd():
+                return [] if self._tickets else self._ended("ended by the client")
+
+    def _start(self, message: SessionStart) -> list[Event]:
+        try:
+            self._agreement = agree(message, self._host.metadata)
+        except InputError as error:
+            raise ProtocolError(error.message) from None
+        return [
+            Reply(
+                SessionStarted(
+                    session_id=self.session_id,
+                    model=self._host.model,
+                    limits=self._host.limits,
+                    joints=self._agreement.joints,
+                    fingerprint=self._host.fingerprint,
+                )
+            )
+        ]
+
+    def _frame(self, frame: Frame, group: int | None = None, place: int = 0) -> list[Event]:
+        """The work of one frame. A bad one is told and leaves no trace."""
+        try:
+            events = self._plan(frame, group, place)
+        except FervorError as error:
+            self._count("rejected")
+            events = [Reply(_error(error, frame))]
+        spare, self._spare = self._spare, []
+        return [*map(Release, spare), *events]
+
+    def _plan(self, frame: Frame, group: int | None, place: int) -> list[Event]:
+        agreement = self._agreed
+        time = agreement.time_of(frame)
+        rotations, observed = frame_pose(frame, agreement.joints, agreement.order)
+        pose = Pose(*agreement.arrange(rotations, observed))
+        body = self._bodies.get(frame.body)
+        if body is not None and (answer := body.answered(frame.seq)) is not None:
+            self._count("duplicate")
+            return self._answer(group, place, answer, expected=False)
+        if body is None or self._is_idle(body, time):
+            self._forget_idle(time)
+            body = self._open_body(frame.body, time, again=body is not None)
+        ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group)
+        self._tickets[ticket] = (body, place)
+        if group is not None:
+            self._groups[group].waiting += 1
+        self._note(ticket)
+        return [ticket]
+
+    def _frames(self, message: Frames) -> list[Event]:
+        most = self._host.limits.max_frames_per_message
+        if len(message.frames) > most:
+            raise FrameError(f"a message has {len(message.frames)} frames; this service takes at most {most}")
+        self._next_group += 1
+        group, gathered = self._next_group, _Group(waiting=1)  # one for the message itself, so that it can't end early
+        self._groups[group] = gathered
+        events: list[Event] = []
+        for place, frame in enumerate(message.frames):
+            events += self._frame(frame, group, place)
+        return events + self._answer(group, -1, None)
+
+    def _answer(
+        self,
+        group: int | None,
+        place: int,
+        estimate: Estimate | None,
+        *,
+        expected: bool = True,
+        superseded: bool = False,
+    ) -> list[Event]:
+        """Send an estimate, alone or with its group once that is complete."""
+        if group is None:
+            return [Reply(estimate)] if estimate is not None and not superseded else []
+        gathered = self._groups[group]
+        gathered.waiting -= expected
+        if estimate is not None:
+            gathered.estimates[place] = estimate
+        if gathered.waiting:
+            return []
+        del self._groups[group]
+        answers = [gathered.estimates[at] for at in sorted(gathered.estimates)]
+        if self._agreed.latest:
+            answers = list({answer.body: answer for answer in answers}.values())
+        return [Reply(Estimates(estimates=tuple(answers)))] if answers else []
+
+    def _superseded(self, body: Body) -> bool:
+        return self._agreed.latest and body.in_flight > 0
+
+    def _open_body(self, name: str, time: float, *, again: bool) -> Body:
+        if len(self._bodies) >= self._host.limits.max_bodies:
+            raise InputError(
+                f"body {name!r} is one too many; this service takes {self._host.limits.max_bodies} a session"
+            )
+        agreement = self._agreed
+        ttl = agreement.terms.emotion_ttl_s
+        label = NO_LABEL if agreement.emotion is None else make_label(agreement.emotion, time, ttl)
+        slot = self._spare.pop() if self._spare else self._host.claim()
+        body = self._bodies[name] = Body(name, slot, agreement.terms, label)
+        if again:
+            body.reset("gap_reset")
+        return body
+
+    def _is_idle(self, body: Body, time: float) -> bool:
+        if self._agreed.terms.clock == "frames" or body.last is None:
+            return False
+        return time - body.last > self._host.limits.body_idle_s
+
+    def _forget_idle(self, time: float) -> None:
+        """Take the slots of bodies that sent nothing for longer than the idle time, by the client's clock."""
+        for body in [body for body in self._bodies.values() if self._is_idle(body, time)]:
+            del self._bodies[body.name]
+            self._spare.append(body.slot)
+
+    def _end_body(self, body: Body) -> list[Event]:
+        del self._bodies[body.name]
+        return [Release(body.slot)]
+
+    def _body(self, name: str) -> Body:
+        body = self._bodies.get(name)
+        if body is None:
+            raise FrameError(f"body {name!r} is not known in this session; it has sent no frame yet", body=name)
+        return body
+
+    def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
+        body.in_flight -= 1
+        body.reset("reset")
+        return [Reply(Error(code=error.code, message=error.message, fatal=False, body=ticket.body, seq=ticket.seq))]
+
+    def _ended(self, reason: str) -> list[Event]:
+        return [Reply(SessionEnded(reason=reason, totals=self.totals)), *self._close(CloseCode.NORMAL, reason)]
+
+    def _close(self, code: CloseCode, reason: str) -> list[Event]:
+        self.state = SessionState.CLOSED
+        return [Close(code, reason), *self._release_all()]
+
+    def _release_all(self) -> list[Event]:
+        released: list[Event] = [Release(body.slot) for body in self._bodies.values()]
+        self._bodies.clear()
+        self._tickets.clear()
+        return released
+
+    def _note(self, ticket: Ticket) -> None:
+        self._count("frames")
+        self._totals["late"] += "late" in ticket.flags
+        self._totals["resets"] += "gap_reset" in ticket.flags or "clock_reset" in ticket.flags
+
+    def _count(self, what: str) -> None:
+        self._totals[what] += 1
+
+    @property
+    def _agreed(self) -> Agreement:
+        if self._agreement is None:
+            raise ProtocolError("the session has not started")
+        return self._agreement
+
+
+def _error(error: FervorError, frame: Frame | None = None) -> Error:
+    """The wire form of an error; one that a frame caused names the frame and ends nothing."""
+    return Error(
+        code=error.code,
+        message=error.message,
+        fatal=error.fatal and frame is None,
+        body=frame.body if frame else getattr(error, "body", None),
+        seq=frame.seq if frame else getattr(error, "seq", None),
+        retry_after=error.retry_after,
+    )

@@ -1,0 +1,97 @@
+"""What `session.start` asks for, checked and turned into what every frame needs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fervor.emotions import emotion_vector
+from fervor.errors import FrameError, InputError
+from fervor.metadata import ModelMetadata
+from fervor.protocol.messages import Emotion, Frame, SessionStart
+from fervor.session.body import Terms
+from fervor.session.events import Source
+from fervor.skeletons.adapter import check_axes
+from fervor.skeletons.catalog import skeleton
+from fervor.skeletons.skeleton import QuaternionOrder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Agreement:
+    """The terms of a session, and how its frames are read."""
+
+    terms: Terms
+    joints: tuple[str, ...]
+    """Joints in every frame, in this order."""
+    order: QuaternionOrder
+    latest: bool
+    """Only the newest estimate of a body is wanted."""
+    emotion: Emotion | None
+    frame_s: float
+    """Seconds a frame stands for where it brings no time (clock `frames`)."""
+    places: npt.NDArray[np.intp] | None
+    """[joint sent] its place in the skeleton; None where all are sent in the skeleton's order."""
+
+    def time_of(self, frame: Frame) -> float:
+        """The frame's time in seconds.
+
+        Raises:
+            FrameError: clock `time`, and the frame has none.
+        """
+        if frame.t is not None:
+            return frame.t
+        if self.terms.clock == "frames":
+            return frame.seq * self.frame_s
+        raise FrameError(f"frame {frame.seq} of body {frame.body!r} has no t; clock 'time' needs seconds")
+
+    def arrange(
+        self, rotations: npt.NDArray[np.float64], observed: npt.NDArray[np.bool_]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+        """Joints as sent ([joint sent, 4], [joint sent]) in the skeleton's order; the others are unobserved."""
+        if self.places is None:
+            return rotations, observed
+        count = len(self.terms.source.skeleton.joints)
+        arranged, seen = np.zeros((count, 4)), np.zeros(count, np.bool_)
+        arranged[self.places], seen[self.places] = rotations, observed
+        return arranged, seen
+
+
+def agree(start: SessionStart, metadata: ModelMetadata) -> Agreement:
+    """Check a `session.start` against what the service can do.
+
+    Raises:
+        InputError: an unknown skeleton, joint or emotion, or axes that the skeleton can't have.
+    """
+    known = skeleton(start.skeleton)
+    source = Source(known, start.axes or known.axes)
+    check_axes(source.skeleton, source.axes)
+    if start.emotion is not None:
+        emotion_vector(start.emotion)
+    return Agreement(
+        terms=Terms(
+            metadata=metadata,
+            source=source,
+            clock=start.clock,
+            memory=start.memory,
+            emotion_ttl_s=start.emotion_ttl_s,
+            by_emotion=start.by_emotion,
+        ),
+        joints=start.joints or known.joints,
+        order=start.quaternion or known.quaternion,
+        latest=start.delivery == "latest",
+        emotion=start.emotion,
+        frame_s=1.0 / (start.nominal_hz or metadata.rate_hz),
+        places=_places(start.joints, known.joints, start.skeleton),
+    )
+
+
+def _places(sent: tuple[str, ...] | None, known: tuple[str, ...], name: str) -> npt.NDArray[np.intp] | None:
+    if sent is None or sent == known:
+        return None
+    place = {joint: index for index, joint in enumerate(known)}
+    unknown = [joint for joint in sent if joint not in place]
+    if unknown:
+        raise InputError(f"skeleton {name!r} has no joint {unknown[0]!r}; expected some of {', '.join(known)}")
+    if len(set(sent)) != len(sent):
+        raise InputError("joints names a joint twice; expected each at most once")
+    return np.array([place[joint] for joint in sent], np.intp)

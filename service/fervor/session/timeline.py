@@ -1,0 +1,97 @@
+"""Client times to the model's grid: which steps a new pose brings, and where between two poses they lie.
+
+Rules, all functions of the frames' times alone, so that a replay repeats them (times in seconds, client clock):
+the first pose after a reset is step 0 and sets the grid · a pose brings every grid step since the pose before it ·
+a gap up to `INTERPOLATE_S` is interpolated · up to `HOLD_S` the steps inside it hold the old pose, unobserved ·
+a longer one starts anew · so does a clock that ran back by more than `HOLD_S`; less than that is a late frame.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+INTERPOLATE_S = 0.25
+"""Longest gap between two poses that is bridged by SLERP."""
+
+HOLD_S = 1.0
+"""Longest gap that keeps the recurrent state alive; also how far a clock may run back and count as late."""
+
+SAME_INSTANT_S = 1e-6
+"""Times closer than this are the same instant: client arithmetic rounds."""
+
+TimelineFlag = Literal["between_steps", "interpolated", "held", "gap_reset", "clock_reset", "late"]
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """One step of the grid."""
+
+    index: int
+    """Steps since the reset."""
+    time: float  # seconds
+    fraction: float
+    """Where between the pose before (0) and the new one (1)."""
+    held: bool
+    """Inside a gap too long to interpolate: the old pose stays, unobserved."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    """Where a body stands on its grid."""
+
+    origin: float  # seconds, time of step 0
+    last: float  # seconds, time of the newest pose
+    steps: int
+    """Steps taken since the reset; also the index of the next one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advance:
+    """What one pose did to a timeline."""
+
+    timeline: Timeline | None
+    instants: tuple[Instant, ...] = ()
+    flags: tuple[TimelineFlag, ...] = ()
+    fresh: bool = False
+    """The body starts anew with this pose."""
+
+
+def begin(time: float, *flags: TimelineFlag) -> Advance:
+    """The first pose after a reset."""
+    return Advance(Timeline(time, time, 1), (Instant(0, time, 1.0, held=False),), flags, fresh=True)
+
+
+def advance(timeline: Timeline | None, time: float, *, rate_hz: float) -> Advance:
+    """The steps that a pose at `time` (seconds) brings to a grid of `rate_hz`; a late one brings none."""
+    if timeline is None:
+        return begin(time)
+    gap = time - timeline.last
+    if gap > HOLD_S + SAME_INSTANT_S:
+        return begin(time, "gap_reset")
+    if gap < -HOLD_S:
+        return begin(time, "clock_reset")
+    if gap <= 0.0:
+        return Advance(timeline, flags=("late",))
+    held = gap > INTERPOLATE_S + SAME_INSTANT_S
+    instants: list[Instant] = []
+    while (at := timeline.origin + (timeline.steps + len(instants)) / rate_hz) <= time + SAME_INSTANT_S:
+        arrived = at >= time - SAME_INSTANT_S
+        fraction = min((at - timeline.last) / gap, 1.0)
+        instants.append(Instant(timeline.steps + len(instants), at, fraction, held and not arrived))
+    moved = Timeline(timeline.origin, time, timeline.steps + len(instants))
+    return Advance(moved, tuple(instants), _describe(instants, held=held))
+
+
+def count_frame(timeline: Timeline | None, time: float) -> Advance:
+    """Clock `frames`: every pose is one step, whatever its time."""
+    if timeline is None:
+        return begin(time)
+    instant = Instant(timeline.steps, time, 1.0, held=False)
+    return Advance(Timeline(timeline.origin, time, timeline.steps + 1), (instant,))
+
+
+def _describe(instants: list[Instant], *, held: bool) -> tuple[TimelineFlag, ...]:
+    if held:
+        return ("held",)
+    if not instants:
+        return ("between_steps",)
+    return ("interpolated",) if len(instants) > 1 else ()

@@ -1,0 +1,49 @@
+"""Which recurrent state runs, restarts and speaks at every step."""
+
+import pytest
+
+from fervor.session.lanes import FADE_S, PERIOD_S, schedule
+
+RATE = 30.0
+
+
+def test_stateful_is_one_lane_restarted_once():
+    assert [(s.lane, s.restart, s.weight) for s in schedule("stateful", 0, RATE)] == [(0, True, 1.0)]
+    for index in (1, 239, 240, 100_000):
+        assert [(s.lane, s.restart, s.weight) for s in schedule("stateful", index, RATE)] == [(0, False, 1.0)]
+
+
+@pytest.mark.parametrize("rate", [1.0, 10.0, 25.0, 30.0, 60.0])
+def test_weights_add_up_and_lanes_restart_half_a_period_apart(rate):
+    half = max(round(PERIOD_S * rate / 2), 1)
+    restarts: dict[int, list[int]] = {0: [], 1: []}
+    for index in range(8 * half):
+        lanes = schedule("staggered", index, rate)
+        assert sum(lane.weight for lane in lanes) == pytest.approx(1.0, abs=1e-15)
+        for lane in lanes:
+            if lane.restart:
+                restarts[lane.lane].append(index)
+    assert restarts == {0: [0, 2 * half, 4 * half, 6 * half], 1: [half, 3 * half, 5 * half, 7 * half]}
+
+
+def test_the_elder_speaks_and_a_restarting_lane_is_silent():
+    for index in range(240, 1000):
+        lanes = {lane.lane: lane for lane in schedule("staggered", index, RATE)}
+        for lane in lanes.values():
+            if lane.restart:
+                assert lane.weight == 0.0
+        elder = 0 if index % 240 >= 120 else 1
+        assert lanes[elder].weight > 0.0
+
+
+def test_cross_fade_takes_half_a_second_in_equal_steps():
+    heard = [schedule("staggered", index, RATE)[0].weight for index in range(120, 361)]
+    fade = [weight for weight in heard if 0.0 < weight < 1.0]
+    assert len(fade) == 2 * round(FADE_S * RATE)
+    steps = [abs(b - a) for a, b in zip(heard, heard[1:], strict=False)]
+    assert max(steps) == pytest.approx(1 / (FADE_S * RATE + 1))
+
+
+def test_first_four_seconds_run_one_lane_only():
+    assert all(len(schedule("staggered", index, RATE)) == 1 for index in range(120))
+    assert len(schedule("staggered", 120, RATE)) == 2
