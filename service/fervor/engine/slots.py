@@ -1,0 +1,58 @@
+"""What the engine keeps of every body: preallocated arrays, a row ("slot") a body.
+
+A slot's first ticket is `fresh` and clears it, so that releasing costs nothing.
+"""
+
+from collections import deque
+
+import numpy as np
+import numpy.typing as npt
+
+from fervor.emotions import EMOTIONS
+from fervor.errors import Overloaded
+from fervor.metadata import ModelMetadata
+from fervor.rotations import IDENTITY
+from fervor.session.lanes import LANES
+from fervor.skeletons.rig import JOINTS
+
+
+class Slots:
+    """Arrays by slot; slots are claimed and released."""
+
+    def __init__(self, capacity: int, metadata: ModelMetadata) -> None:
+        joints = len(JOINTS)
+        self.capacity = capacity
+        self.pose = np.tile(IDENTITY, (capacity, joints, 1))  # [slot, joint, 4] xyzw, the newest pose, holes held
+        self.observed = np.zeros((capacity, joints), np.bool_)  # [slot, joint]
+        self.jumps = np.zeros((capacity, joints), np.int64)  # [slot, joint] frames rejected in a row
+        self.states = {
+            state.name: np.zeros((capacity, LANES, *state.shape), np.float32) for state in metadata.states
+        }  # name → [slot, lane, *shape]
+        self.intensity = np.full(capacity, np.nan, np.float64)  # [slot], nan: no step yet
+        self.by_emotion = np.zeros((capacity, len(EMOTIONS)), np.float64)  # [slot, emotion]
+        self.seen = np.zeros(capacity, np.int64)  # [slot] upper-body joints observed
+        self._free = deque(range(capacity))
+
+    @property
+    def taken(self) -> int:
+        """Slots in use."""
+        return self.capacity - len(self._free)
+
+    def claim(self) -> int:
+        """A free slot.
+
+        Raises:
+            Overloaded: none is left.
+        """
+        if not self._free:
+            raise Overloaded(f"all {self.capacity} bodies this service can hold are in use", retry_after=5.0)
+        return self._free.popleft()
+
+    def release(self, slot: int) -> None:
+        """Make a slot free again; the least recently used is claimed next."""
+        self._free.append(slot)
+
+    def clear(self, slots: npt.NDArray[np.intp]) -> None:
+        """Forget what these slots [any] hold; states are zeroed by the lanes that restart."""
+        self.pose[slots], self.observed[slots], self.jumps[slots] = IDENTITY, False, 0
+        self.intensity[slots], self.by_emotion[slots], self.seen[slots] = np.nan, 0.0, 0
