@@ -42,5 +42,5 @@ def host(claim, **limits) -> Host:
 def motion(frames: int, *, seed: int = 0, joints: int = 13, speed: float = 0.05) -> np.ndarray:
     """A smooth random walk of rotations: [frame, joint, 4] xyzw, unit."""
     random = np.random.default_rng(seed)
-    walk = np.cumsum(random.standard_normal((frames, joints, 4)) * speed, axis=0) + [0.0, 0.0, 0.0, 2.0]
+    walk = np.cumsum(random.standard_normal((frames, joints, 4)) * speed, axis=0) + np.array([0.0, 0.0, 0.0, 2.0])
     return walk / np.linalg.norm(walk, axis=-1, keepdims=True)

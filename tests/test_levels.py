@@ -1,5 +1,7 @@
 """Hysteresis and dwell."""
 
+import itertools
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -43,7 +45,7 @@ def test_changes_are_never_closer_than_the_dwell(values):
         if state is not None and following.level is not state.level:
             changes.append(index / 30)
         state = following
-    assert all(b - a >= RULE["dwell"] - 1e-9 for a, b in zip(changes, changes[1:], strict=False))
+    assert all(b - a >= RULE["dwell"] - 1e-9 for a, b in itertools.pairwise(changes))
 
 
 def test_level_values_are_the_wire_words():

@@ -1,5 +1,7 @@
 """Which recurrent state runs, restarts and speaks at every step."""
 
+import itertools
+
 import pytest
 
 from fervor.session.lanes import FADE_S, PERIOD_S, schedule
@@ -40,7 +42,7 @@ def test_cross_fade_takes_half_a_second_in_equal_steps():
     heard = [schedule("staggered", index, RATE)[0].weight for index in range(120, 361)]
     fade = [weight for weight in heard if 0.0 < weight < 1.0]
     assert len(fade) == 2 * round(FADE_S * RATE)
-    steps = [abs(b - a) for a, b in zip(heard, heard[1:], strict=False)]
+    steps = [abs(b - a) for a, b in itertools.pairwise(heard)]
     assert max(steps) == pytest.approx(1 / (FADE_S * RATE + 1))
 
 
