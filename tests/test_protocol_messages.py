@@ -49,5 +49,5 @@ def test_round_trip_to_the_bit(codec, frame, estimate):
 
 def test_fields_are_described_or_speak_for_themselves():
     schema = TypeAdapter(ClientMessage).json_schema()
-    assert set(schema["$defs"]) == {cls.__name__ for cls in variants(ClientMessage)}
+    assert {cls.__name__ for cls in variants(ClientMessage)} <= set(schema["$defs"])
     assert all(definition["description"] for definition in schema["$defs"].values())

@@ -11,6 +11,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from fervor.levels import Level
+from fervor.protocol.skeleton_spec import SkeletonSpec
+from fervor.skeletons.calibration import HeldPose
 from fervor.skeletons.skeleton import Axes, QuaternionOrder
 
 PROTOCOL = "fervor.v1"
@@ -53,7 +55,7 @@ class SessionStart(_Message):
     """Opens the conversation: what the client will send, and what it wants back."""
 
     type: Literal["session.start"] = "session.start"
-    skeleton: str = Field("c13", description="name from /v1/skeletons")
+    skeleton: str | SkeletonSpec = Field("c13", description="name from /v1/skeletons, or one of your own")
     axes: Axes | None = Field(None, description="default: what the skeleton's sensor gives")
     quaternion: QuaternionOrder | None = Field(None, description="default: what the skeleton's sensor gives")
     joints: tuple[str, ...] | None = Field(None, description="joints sent, in this order; others count as untracked")
@@ -105,6 +107,21 @@ class BodyEnd(_Message):
     body: BodyId
 
 
+Vector = tuple[float, float, float]
+
+
+class SessionCalibrate(_Message):
+    """Takes the alignment of an unknown sensor from a pose that a body holds from its next frame on."""
+
+    type: Literal["session.calibrate"] = "session.calibrate"
+    body: BodyId = "0"
+    pose: HeldPose = Field("n", description="`n`: arms hanging; `t`: arms straight out to the sides")
+    seconds: float = Field(1.0, ge=0.2, le=10.0, description="how long the pose is held, client clock")
+    up: Vector = Field((0.0, 1.0, 0.0), description="the person's up in sensor axes")
+    forward: Vector = Field((0.0, 0.0, 1.0), description="the way the person faces, in sensor axes")
+    name: str | None = Field(None, min_length=1, max_length=64, description="for the skeleton that comes back")
+
+
 class Ping(_Message):
     """Asks for a pong, through the same queue as frames' errors."""
 
@@ -119,7 +136,8 @@ class SessionEnd(_Message):
 
 
 ClientMessage = Annotated[
-    SessionStart | Frame | Frames | BodyReset | BodyEnd | Ping | SessionEnd, Field(discriminator="type")
+    SessionStart | Frame | Frames | BodyReset | BodyEnd | SessionCalibrate | Ping | SessionEnd,
+    Field(discriminator="type"),
 ]
 
 
@@ -186,6 +204,16 @@ class Estimates(_Message):
     estimates: tuple[Estimate, ...]
 
 
+class SessionCalibrated(_Message):
+    """The answer to `session.calibrate`: in force from the next frame on; `session.start` takes it again."""
+
+    type: Literal["session.calibrated"] = "session.calibrated"
+    skeleton: SkeletonSpec
+    frames: int
+    spread_deg: float = Field(description="largest deviation of a segment from its mean, degrees")
+    unseen: tuple[str, ...] = Field(description="segments that were never tracked; they keep their alignment")
+
+
 class Pong(_Message):
     """The answer to `ping`."""
 
@@ -225,5 +253,5 @@ class SessionEnded(_Message):
 
 
 ServerMessage = Annotated[
-    SessionStarted | Estimate | Estimates | Pong | Error | SessionEnded, Field(discriminator="type")
+    SessionStarted | Estimate | Estimates | SessionCalibrated | Pong | Error | SessionEnded, Field(discriminator="type")
 ]

@@ -55,8 +55,7 @@ class Body:
         self._emotion = UNKNOWN
         self._pending: tuple[Flag, ...] = ()
         self._answers: OrderedDict[int, Estimate] = OrderedDict()
-        seen = terms.source.skeleton.sees
-        self._enough = ENOUGH_JOINTS * sum(seen[joint] for joint in UPPER_BODY)
+        self._enough = _enough(terms)
 
     @property
     def last(self) -> float | None:
@@ -68,6 +67,12 @@ class Body:
         self._timeline = None
         self._level = None
         self._pending = (flag,)
+
+    def adopt(self, terms: Terms) -> None:
+        """Go on under new terms, from a reset."""
+        self._terms = terms
+        self._enough = _enough(terms)
+        self.reset()
 
     def answered(self, seq: int) -> Estimate | None:
         """The estimate a duplicate of frame `seq` gets again; None if it is under way or forgotten."""
@@ -175,3 +180,9 @@ class Body:
         if not self._terms.by_emotion or outcome.intensity is None:
             return None
         return dict(zip(EMOTIONS, outcome.by_emotion.tolist(), strict=True))
+
+
+def _enough(terms: Terms) -> float:
+    """Upper-body joints that a frame must show."""
+    seen = terms.source.skeleton.sees
+    return ENOUGH_JOINTS * sum(seen[joint] for joint in UPPER_BODY)

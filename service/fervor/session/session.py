@@ -4,7 +4,7 @@ The caller's duties: hand every message to `receive` (or, if it could not be dec
 every `Ticket` to the engine in order and hand each outcome to `conclude`; call `lost` once when the connection is gone.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from fervor.errors import CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
@@ -22,6 +22,8 @@ from fervor.protocol.messages import (
     ModelInfo,
     Ping,
     Pong,
+    SessionCalibrate,
+    SessionCalibrated,
     SessionEnd,
     SessionEnded,
     SessionStart,
@@ -29,11 +31,16 @@ from fervor.protocol.messages import (
     Totals,
 )
 from fervor.protocol.poses import frame_pose
+from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
+from fervor.session.calibrating import Calibrating
 from fervor.session.events import Close, Event, Outcome, Pose, Release, Reply, Ticket
+from fervor.session.groups import Groups
 from fervor.session.label import NO_LABEL, make_label
 from fervor.session.start import Agreement, agree
 from fervor.session.state import SessionState, transition
+from fervor.skeletons.calibration import facing
+from fervor.skeletons.skeleton import Skeleton
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +53,8 @@ class Host:
     fingerprint: str
     claim: Callable[[], int]
     """Takes a free slot of the engine; raises Overloaded."""
-
-
-@dataclass(slots=True)
-class _Group:
-    """The answers to one `frames` message, gathered."""
-
-    waiting: int = 0
-    estimates: dict[int, Estimate] = field(default_factory=dict)  # position in the message → answer
+    skeletons: Mapping[str, Skeleton] = field(default_factory=dict)
+    """Skeletons beside the catalogue's, by name: calibrations kept on this service."""
 
 
 class Session:
@@ -68,8 +69,8 @@ class Session:
         self._spare: list[int] = []
         """Slots of forgotten bodies, for the next new one."""
         self._tickets: dict[Ticket, tuple[Body, int]] = {}  # under way → its body, its place in the group
-        self._groups: dict[int, _Group] = {}
-        self._next_group = 0
+        self._groups = Groups()
+        self._calibrating: Calibrating | None = None
         self._totals = Totals().model_dump()
 
     @property
@@ -100,11 +101,13 @@ class Session:
         if entry is None or self.state is SessionState.CLOSED:
             return []
         body, place = entry
-        events = self._fail(ticket, body, outcome) if isinstance(outcome, EngineError) else []
-        estimate = None if isinstance(outcome, EngineError) else body.conclude(ticket, outcome)
-        if estimate is not None:
-            self._count("estimates")
-        events += self._answer(ticket.group, place, estimate, superseded=self._superseded(body))
+        events: list[Event] = []
+        if isinstance(outcome, EngineError):
+            events += self._fail(ticket, body, outcome)
+        else:
+            events += self._deliver(ticket.group, place, body.conclude(ticket, outcome), body)
+        if ticket.group is not None:
+            events += self._close_group(ticket.group)
         if self.state is SessionState.ENDING and not self._tickets:
             events += self._ended("ended by the client")
         return events
@@ -130,6 +133,10 @@ class Session:
                 return []
             case BodyEnd():
                 return self._end_body(self._body(message.body))
+            case SessionCalibrate():
+                facing(message.up, message.forward)
+                self._calibrating = Calibrating(message, self._agreed.terms.source)
+                return []
             case Ping():
                 return [Reply(Pong(id=message.id))]
             case SessionEnd():
@@ -137,7 +144,7 @@ class Session:
 
     def _start(self, message: SessionStart) -> list[Event]:
         try:
-            self._agreement = agree(message, self._host.metadata)
+            self._agreement = agree(message, self._host.metadata, self._host.skeletons)
         except InputError as error:
             raise ProtocolError(error.message) from None
         return [
@@ -170,55 +177,41 @@ class Session:
         body = self._bodies.get(frame.body)
         if body is not None and (answer := body.answered(frame.seq)) is not None:
             self._count("duplicate")
-            return self._answer(group, place, answer, expected=False)
+            if group is None:
+                return [Reply(answer)]
+            self._groups.put(group, place, answer)
+            return []
         if body is None or self._is_idle(body, time):
             self._forget_idle(time)
             body = self._open_body(frame.body, time, again=body is not None)
         ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group)
         self._tickets[ticket] = (body, place)
         if group is not None:
-            self._groups[group].waiting += 1
+            self._groups.expect(group)
         self._note(ticket)
-        return [ticket]
+        return [ticket, *self._calibrate(frame.body, time, pose)]
 
     def _frames(self, message: Frames) -> list[Event]:
         most = self._host.limits.max_frames_per_message
         if len(message.frames) > most:
             raise FrameError(f"a message has {len(message.frames)} frames; this service takes at most {most}")
-        self._next_group += 1
-        group, gathered = self._next_group, _Group(waiting=1)  # one for the message itself, so that it can't end early
-        self._groups[group] = gathered
-        events: list[Event] = []
-        for place, frame in enumerate(message.frames):
-            events += self._frame(frame, group, place)
-        return events + self._answer(group, -1, None)
+        group = self._groups.open()
+        events = [event for place, frame in enumerate(message.frames) for event in self._frame(frame, group, place)]
+        return events + self._close_group(group)
 
-    def _answer(
-        self,
-        group: int | None,
-        place: int,
-        estimate: Estimate | None,
-        *,
-        expected: bool = True,
-        superseded: bool = False,
-    ) -> list[Event]:
-        """Send an estimate, alone or with its group once that is complete."""
-        if group is None:
-            return [Reply(estimate)] if estimate is not None and not superseded else []
-        gathered = self._groups[group]
-        gathered.waiting -= expected
-        if estimate is not None:
-            gathered.estimates[place] = estimate
-        if gathered.waiting:
+    def _close_group(self, group: int) -> list[Event]:
+        answers = self._groups.close(group)
+        if answers and self._agreed.latest:
+            answers = tuple({answer.body: answer for answer in answers}.values())
+        return [Reply(Estimates(estimates=answers))] if answers else []
+
+    def _deliver(self, group: int | None, place: int, estimate: Estimate, body: Body) -> list[Event]:
+        """Send an estimate, or put it with its group; delivery `latest` skips one that a newer is about to replace."""
+        self._count("estimates")
+        if group is not None:
+            self._groups.put(group, place, estimate)
             return []
-        del self._groups[group]
-        answers = [gathered.estimates[at] for at in sorted(gathered.estimates)]
-        if self._agreed.latest:
-            answers = list({answer.body: answer for answer in answers}.values())
-        return [Reply(Estimates(estimates=tuple(answers)))] if answers else []
-
-    def _superseded(self, body: Body) -> bool:
-        return self._agreed.latest and body.in_flight > 0
+        return [] if self._agreed.latest and body.in_flight else [Reply(estimate)]
 
     def _open_body(self, name: str, time: float, *, again: bool) -> Body:
         if len(self._bodies) >= self._host.limits.max_bodies:
@@ -244,6 +237,29 @@ class Session:
         for body in [body for body in self._bodies.values() if self._is_idle(body, time)]:
             del self._bodies[body.name]
             self._spare.append(body.slot)
+
+    def _calibrate(self, body: str, time: float, pose: Pose) -> list[Event]:
+        """Hand a frame to the calibration under way; adopt its result."""
+        if self._calibrating is None or body != self._calibrating.request.body:
+            return []
+        name = self._calibrating.request.name
+        try:
+            found = self._calibrating.add(time, pose)
+        except InputError as error:
+            self._calibrating = None
+            return [Reply(_error(error))]
+        if found is None:
+            return []
+        self._calibrating = None
+        self._agreement = self._agreed.aligned(found.skeleton)
+        for known in self._bodies.values():
+            known.adopt(self._agreement.terms)
+        spec = SkeletonSpec.of(found.skeleton, name=name)
+        return [
+            Reply(
+                SessionCalibrated(skeleton=spec, frames=found.frames, spread_deg=found.spread_deg, unseen=found.unseen)
+            )
+        ]
 
     def _end_body(self, body: Body) -> list[Event]:
         del self._bodies[body.name]

@@ -1,6 +1,8 @@
 """What `session.start` asks for, checked and turned into what every frame needs."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -9,11 +11,12 @@ from fervor.emotions import emotion_vector
 from fervor.errors import FrameError, InputError
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Emotion, Frame, SessionStart
+from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
 from fervor.session.events import Source
 from fervor.skeletons.adapter import check_axes
 from fervor.skeletons.catalog import skeleton
-from fervor.skeletons.skeleton import QuaternionOrder
+from fervor.skeletons.skeleton import QuaternionOrder, Skeleton
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,14 +58,20 @@ class Agreement:
         arranged[self.places], seen[self.places] = rotations, observed
         return arranged, seen
 
+    def aligned(self, skeleton: Skeleton) -> "Agreement":
+        """The same agreement for the same sensor under another alignment."""
+        return replace(self, terms=replace(self.terms, source=Source(skeleton, self.terms.source.axes)))
 
-def agree(start: SessionStart, metadata: ModelMetadata) -> Agreement:
-    """Check a `session.start` against what the service can do.
+
+def agree(
+    start: SessionStart, metadata: ModelMetadata, skeletons: Mapping[str, Skeleton] = MappingProxyType({})
+) -> Agreement:
+    """Check a `session.start` against what the service can do; `skeletons` are those beside the catalogue's.
 
     Raises:
         InputError: an unknown skeleton, joint or emotion, or axes that the skeleton can't have.
     """
-    known = skeleton(start.skeleton)
+    known = _known(start.skeleton, skeletons)
     source = Source(known, start.axes or known.axes)
     check_axes(source.skeleton, source.axes)
     if start.emotion is not None:
@@ -81,8 +90,14 @@ def agree(start: SessionStart, metadata: ModelMetadata) -> Agreement:
         latest=start.delivery == "latest",
         emotion=start.emotion,
         frame_s=1.0 / (start.nominal_hz or metadata.rate_hz),
-        places=_places(start.joints, known.joints, start.skeleton),
+        places=_places(start.joints, known.joints, known.name),
     )
+
+
+def _known(asked: str | SkeletonSpec, skeletons: Mapping[str, Skeleton]) -> Skeleton:
+    if isinstance(asked, SkeletonSpec):
+        return asked.to_skeleton()
+    return skeletons.get(asked) or skeleton(asked)
 
 
 def _places(sent: tuple[str, ...] | None, known: tuple[str, ...], name: str) -> npt.NDArray[np.intp] | None:

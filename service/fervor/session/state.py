@@ -27,6 +27,7 @@ TRANSITIONS: Mapping[tuple[SessionState, str], SessionState] = {
     (SessionState.OPEN, "frames"): SessionState.OPEN,
     (SessionState.OPEN, "body.reset"): SessionState.OPEN,
     (SessionState.OPEN, "body.end"): SessionState.OPEN,
+    (SessionState.OPEN, "session.calibrate"): SessionState.OPEN,
     (SessionState.OPEN, "ping"): SessionState.OPEN,
     (SessionState.OPEN, "session.end"): SessionState.ENDING,
 }
