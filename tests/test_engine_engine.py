@@ -185,3 +185,15 @@ def test_a_gap_held_runs_masked_steps():
     engine.run([body.plan(0, 0.0, Pose(rotations[0], ALL))])
     engine.run([body.plan(1, 0.5, Pose(rotations[1], ALL))])
     assert [mask.all() for mask in seen] == [True, *[False] * 14, True]
+
+
+def test_window_is_the_model_on_the_last_four_seconds():
+    rotations = motion(200)
+    engine = Engine(model(), capacity=2)
+    windowed = plan(Body("a", engine.claim(), terms(memory="window")), rotations, rate=30)
+    beside = plan(Body("b", engine.claim(), terms()), rotations, rate=30)
+    outcomes = [engine.run(pair) for pair in zip(windowed, beside, strict=True)]
+    for at in (0, 1, 50, 119, 120, 150, 199):
+        expected = whole_sequence(rotations[max(at - 119, 0) : at + 1])[-1]
+        assert outcomes[at][0].intensity == expected
+    assert intensities(pair[1] for pair in outcomes) == whole_sequence(rotations).tolist()

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fervor.engine.history import NO_HISTORY, History
 from fervor.engine.posing import Poses, adapt_all, between, hold, reject_jumps
 from fervor.engine.slots import Slots
 from fervor.errors import EngineError
-from fervor.model import Model
+from fervor.model import Floats, Model
 from fervor.session.events import Outcome, Step, Ticket
 from fervor.session.lanes import LANES
 from fervor.skeletons.rig import UPPER_BODY
@@ -21,7 +22,7 @@ from fervor.skeletons.rig import UPPER_BODY
 MOST_ROWS = 256
 """Rows in one call of the model; larger batches are cut, for cache and latency."""
 
-States = dict[str, npt.NDArray[np.float32]]  # name → [row, *shape]
+States = dict[str, Floats]  # name → [row, *shape]
 
 
 class Engine:
@@ -84,10 +85,10 @@ class Engine:
                 int(jumped[row]),
             )
 
-    def _turn(self, tickets: Sequence[Ticket], turn: int, old: Poses, new: Poses, memory: "_Memory") -> None:
-        """One grid step of every ticket that has a step number `turn`."""
-        live = [row for row, ticket in enumerate(tickets) if len(ticket.steps) > turn]
-        steps = [tickets[row].steps[turn] for row in live]
+    def _turn(self, tickets: Sequence[Ticket], number: int, old: Poses, new: Poses, memory: "_Memory") -> None:
+        """One grid step of every ticket that has a step `number`."""
+        live = [row for row, ticket in enumerate(tickets) if len(ticket.steps) > number]
+        steps = [tickets[row].steps[number] for row in live]
         index = np.array(live, np.intp)
         rotations, mask = between(
             Poses(old.rotations[index], old.observed[index]),
@@ -96,24 +97,57 @@ class Engine:
             np.array([step.held for step in steps]),
         )
         emotion = np.stack([step.label.vector for step in steps])  # [step, emotion]
-        lanes = _LaneRows.of(steps)
-        at = (index[lanes.step], lanes.lane)
+        taken = _Turn(index, steps, rotations, mask, emotion)
+        self._run_lanes(taken, memory)
+        self._run_windows(taken, memory)
+
+    def _run_lanes(self, turn: "_Turn", memory: "_Memory") -> None:
+        """The steps of bodies with recurrent states."""
+        lanes = _LaneRows.of(turn.steps)
+        if not len(lanes.step):
+            return
+        at = (turn.index[lanes.step], lanes.lane)
         states = {name: state[at] for name, state in memory.states.items()}
         for state in states.values():
             state[lanes.restart] = 0.0
-        intensity, by_emotion, states = self._call(rotations[lanes.step], mask[lanes.step], emotion[lanes.step], states)
+        intensity, by_emotion, states = self._call(
+            turn.rotations[lanes.step], turn.mask[lanes.step], turn.emotion[lanes.step], states
+        )
         for name, state in states.items():
             memory.states[name][at] = state
-        memory.intensity[index] = lanes.blend(intensity[:, None], len(steps))[:, 0]
-        memory.by_emotion[index] = lanes.blend(by_emotion, len(steps))
+        stateful = np.array([bool(step.schedule) for step in turn.steps])
+        rows = turn.index[stateful]
+        memory.intensity[rows] = lanes.blend(intensity[:, None], len(turn.steps))[stateful, 0]
+        memory.by_emotion[rows] = lanes.blend(by_emotion, len(turn.steps))[stateful]
+
+    def _run_windows(self, turn: "_Turn", memory: "_Memory") -> None:
+        """The steps of bodies with a window, those of one length together."""
+        by_length: dict[int, list[int]] = {}
+        for number, step in enumerate(turn.steps):
+            if step.window:
+                ticket = int(turn.index[number])
+                history = memory.histories.get(ticket, NO_HISTORY)
+                memory.histories[ticket] = history.then(turn.rotations[number], turn.mask[number], step.window)
+                by_length.setdefault(len(memory.histories[ticket]), []).append(number)
+        for length, numbers in by_length.items():
+            rows = turn.index[numbers]
+            poses = [memory.histories[ticket] for ticket in rows.tolist()]
+            outputs = self.model.run(
+                np.stack([pose.rotations for pose in poses]),
+                np.stack([pose.mask for pose in poses]),
+                np.repeat(turn.emotion[numbers][:, None], length, axis=1),
+                self.model.zero_states(len(numbers)),
+            )
+            memory.intensity[rows] = _finite(outputs.intensity[:, -1])
+            memory.by_emotion[rows] = outputs.intensity_by_emotion[:, -1]
 
     def _call(
         self,
-        rotations: npt.NDArray[np.float32],  # [row, joint, 4]
-        mask: npt.NDArray[np.float32],  # [row, joint]
-        emotion: npt.NDArray[np.float32],  # [row, emotion]
+        rotations: Floats,  # [row, joint, 4]
+        mask: Floats,  # [row, joint]
+        emotion: Floats,  # [row, emotion]
         states: States,
-    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], States]:
+    ) -> tuple[Floats, Floats, States]:
         """One step of the model, cut into calls: intensity [row], by emotion [row, 11], next states."""
         parts = []
         for first in range(0, len(rotations), MOST_ROWS):
@@ -126,9 +160,9 @@ class Engine:
                 _pad(emotion[cut], spare)[:, None],
                 {name: _pad(state[cut], spare) for name, state in states.items()},
             )
-            if not np.isfinite(outputs.intensity[:count]).all():
-                raise EngineError("the model gave an intensity that is not finite; the body starts anew")
-            parts.append((outputs.intensity[:count, 0], outputs.intensity_by_emotion[:count, 0], outputs.states, count))
+            parts.append(
+                (_finite(outputs.intensity[:count, 0]), outputs.intensity_by_emotion[:count, 0], outputs.states, count)
+            )
         return (
             np.concatenate([part[0] for part in parts]),
             np.concatenate([part[1] for part in parts]),
@@ -137,21 +171,37 @@ class Engine:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Turn:
+    """One grid step of some of a batch's tickets."""
+
+    index: npt.NDArray[np.intp]  # [step] its ticket
+    steps: Sequence[Step]
+    rotations: Floats  # [step, joint, 4] xyzw
+    mask: Floats  # [step, joint]
+    emotion: Floats  # [step, emotion]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Memory:
     """Working copies of the batch's slots, stored only when the whole batch succeeded."""
 
     states: States  # name → [ticket, lane, *shape]
+    histories: dict[int, History]  # ticket → last poses, windows only
     intensity: npt.NDArray[np.float64]  # [ticket]
     by_emotion: npt.NDArray[np.float64]  # [ticket, emotion]
 
     @classmethod
     def of(cls, slots: Slots, rows: npt.NDArray[np.intp]) -> "_Memory":
         states = {name: state[rows] for name, state in slots.states.items()}
-        return cls(states, slots.intensity[rows], slots.by_emotion[rows])
+        places = enumerate(rows.tolist())
+        histories = {at: slots.histories[slot] for at, slot in places if slot in slots.histories}
+        return cls(states, histories, slots.intensity[rows], slots.by_emotion[rows])
 
     def store(self, slots: Slots, rows: npt.NDArray[np.intp]) -> None:
         for name, state in self.states.items():
             slots.states[name][rows] = state
+        for at, history in self.histories.items():
+            slots.histories[int(rows[at])] = history
         slots.intensity[rows], slots.by_emotion[rows] = self.intensity, self.by_emotion
 
 
@@ -174,7 +224,7 @@ class _LaneRows:
             np.array([lane.weight for _, lane in rows], np.float64),
         )
 
-    def blend(self, values: npt.NDArray[np.float32], steps: int) -> npt.NDArray[np.float64]:
+    def blend(self, values: Floats, steps: int) -> npt.NDArray[np.float64]:
         """Values [row, k] of the lanes, weighted into one a step: [step, k]."""
         blended = np.zeros((steps, values.shape[1]))
         for lane in range(LANES):  # a step has each lane once, so no two rows meet in one sum
@@ -183,5 +233,11 @@ class _LaneRows:
         return blended
 
 
-def _pad(rows: npt.NDArray[np.float32], spare: int) -> npt.NDArray[np.float32]:
+def _finite(intensity: Floats) -> Floats:
+    if not np.isfinite(intensity).all():
+        raise EngineError("the model gave an intensity that is not finite; the body starts anew")
+    return intensity
+
+
+def _pad(rows: Floats, spare: int) -> Floats:
     return np.concatenate([rows, np.repeat(rows[:1], spare, axis=0)]) if spare else rows

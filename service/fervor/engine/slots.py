@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fervor.emotions import EMOTIONS
+from fervor.engine.history import History
 from fervor.errors import Overloaded
 from fervor.metadata import ModelMetadata
 from fervor.rotations import IDENTITY
@@ -28,6 +29,7 @@ class Slots:
         self.states = {
             state.name: np.zeros((capacity, LANES, *state.shape), np.float32) for state in metadata.states
         }  # name → [slot, lane, *shape]
+        self.histories: dict[int, History] = {}  # slot → its last poses, for bodies with memory `window` only
         self.intensity = np.full(capacity, np.nan, np.float64)  # [slot], nan: no step yet
         self.by_emotion = np.zeros((capacity, len(EMOTIONS)), np.float64)  # [slot, emotion]
         self.seen = np.zeros(capacity, np.int64)  # [slot] upper-body joints observed
@@ -50,9 +52,12 @@ class Slots:
 
     def release(self, slot: int) -> None:
         """Make a slot free again; the least recently used is claimed next."""
+        self.histories.pop(slot, None)
         self._free.append(slot)
 
     def clear(self, slots: npt.NDArray[np.intp]) -> None:
         """Forget what these slots [any] hold; states are zeroed by the lanes that restart."""
         self.pose[slots], self.observed[slots], self.jumps[slots] = IDENTITY, False, 0
+        for slot in slots.tolist():
+            self.histories.pop(slot, None)
         self.intensity[slots], self.by_emotion[slots], self.seen[slots] = np.nan, 0.0, 0

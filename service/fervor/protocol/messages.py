@@ -32,8 +32,9 @@ Clock = Literal["time", "frames"]
 Delivery = Literal["every", "latest"]
 """`every`: one estimate a frame; `latest`: only the newest of a body where several are ready together."""
 
-Memory = Literal["staggered", "stateful"]
-"""`staggered`: two states restarted in turn, for streams of any length; `stateful`: one state, as in the paper."""
+Memory = Literal["staggered", "stateful", "window"]
+"""`staggered`: two states restarted in turn, for streams of any length; `stateful`: one state, as in the paper;
+`window`: the last four seconds from a state of zero at every step, exact and costly."""
 
 Status = Literal["warming_up", "ok", "insufficient"]
 """Whether to trust an estimate: too early, yes, or too few joints seen."""

@@ -13,7 +13,7 @@ from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
 from fervor.session.label import NO_LABEL, Label, make_label
-from fervor.session.lanes import schedule
+from fervor.session.lanes import schedule, window_steps
 from fervor.session.timeline import Advance, Instant, Timeline, advance, count_frame
 from fervor.skeletons.rig import UPPER_BODY
 
@@ -157,8 +157,14 @@ class Body:
         return advance(self._timeline, time, rate_hz=self._terms.metadata.rate_hz)
 
     def _step(self, instant: Instant) -> Step:
-        lanes = schedule(self._terms.memory, instant.index, self._terms.metadata.rate_hz)
-        return Step(instant.fraction, instant.held, lanes, self._label.at(instant.time))
+        memory, rate = self._terms.memory, self._terms.metadata.rate_hz
+        return Step(
+            fraction=instant.fraction,
+            held=instant.held,
+            schedule=schedule(memory, instant.index, rate),
+            window=window_steps(memory, rate),
+            label=self._label.at(instant.time),
+        )
 
     def _next_level(self, intensity: float, time: float) -> LevelState:
         rule = self._terms.metadata.levels

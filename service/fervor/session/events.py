@@ -62,6 +62,8 @@ class Step:
     held: bool
     """The pose before stays, unobserved."""
     schedule: Schedule
+    """The lanes that run; empty where `window` says how many poses to run from zero instead."""
+    window: int
     label: Label
 
 

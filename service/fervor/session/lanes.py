@@ -2,7 +2,8 @@
 
 A network trained on clips of seconds must not run for minutes on one state. `staggered` keeps two lanes, each
 restarted every `PERIOD_S`, half a period apart; the older one speaks, and hands over in a cross-fade of `FADE_S` that
-ends where it restarts. `stateful` is the paper's: one lane, never restarted.
+ends where it restarts. `stateful` is the paper's: one lane, never restarted. `window` has no state at all: every step
+runs the last `WINDOW_S` of poses from zero.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ LANES = 2
 
 PERIOD_S = 8.0
 FADE_S = 0.5
+WINDOW_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +36,18 @@ _ALONE: Schedule = (LaneStep(0, restart=False, weight=1.0),)
 
 
 def schedule(memory: Memory, index: int, rate_hz: float) -> Schedule:
-    """The lanes that run in step `index` since the reset (index 0 restarts lane 0)."""
+    """The lanes that run in step `index` since the reset (index 0 restarts lane 0); none for `window`."""
+    if memory == "window":
+        return ()
     if memory == "stateful":
         return (LaneStep(0, restart=True, weight=1.0),) if index == 0 else _ALONE
     opening, cycle = _staggered(rate_hz)
     return opening[index] if index < len(opening) else cycle[index % len(cycle)]
+
+
+def window_steps(memory: Memory, rate_hz: float) -> int:
+    """Steps in the window; 0 for memories that have a state instead."""
+    return max(round(WINDOW_S * rate_hz), 1) if memory == "window" else 0
 
 
 @cache
