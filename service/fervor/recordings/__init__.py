@@ -1,0 +1,1 @@
+"""Recordings: motion files read into rotations with time stamps."""
