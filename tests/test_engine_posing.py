@@ -8,6 +8,7 @@ from bodies import motion, terms
 from fervor.engine.posing import JUMPS_BELIEVED, Poses, adapt_all, between, hold, reject_jumps
 from fervor.session.body import Body
 from fervor.session.events import Pose
+from fervor.skeletons.positions import no_hinges
 
 ALL = np.ones((1, 13), np.bool_)
 NOISY = np.array([True])
@@ -93,8 +94,8 @@ def test_adapting_a_mixed_batch_gives_each_row_what_it_gets_alone(count):
         rotations = motion(1, seed=row, joints=joints)[0]
         body = Body(str(row), row, agreed)
         tickets.append(body.plan(0, 0.0, Pose(rotations, np.arange(joints) != row % joints)))
-    together = adapt_all(tickets)
+    together, _ = adapt_all(tickets, no_hinges((count,)))
     for row, ticket in enumerate(tickets):
-        alone = adapt_all([ticket])
+        alone, _ = adapt_all([ticket], no_hinges((1,)))
         assert np.array_equal(together.rotations[row], alone.rotations[0])
         assert np.array_equal(together.observed[row], alone.observed[0])

@@ -5,7 +5,7 @@ import pytest
 
 from fervor.errors import FrameError
 from fervor.protocol.messages import Frame
-from fervor.protocol.poses import frame_pose
+from fervor.protocol.poses import frame_points, frame_pose
 
 JOINTS = ("a", "b", "c")
 UNIT = (0.0, 0.0, 0.0, 1.0)
@@ -44,3 +44,35 @@ def test_poison_is_refused_whole_naming_the_joint(bad, told):
         frame_pose(bad, JOINTS, "xyzw")
     assert caught.value.message.startswith("frame 7 of body 'eve' ")
     assert (caught.value.body, caught.value.seq) == ("eve", 7)
+
+
+def points(*p, mask=None, **more):
+    return Frame(body="eve", seq=7, t=0.0, p=p, mask=mask, **more)
+
+
+def test_positions_of_landmark_sensors():
+    positions, observed = frame_points(points((1, 2, 3.5), None, (0, 0, 0), mask=(True, True, False)), JOINTS)
+    assert positions.tolist() == [[1, 2, 3.5], [0, 0, 0], [0, 0, 0]]
+    assert observed.tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("bad", "told"),
+    [
+        (points((0, 0, 0)), "has 1 joints in p; expected 3"),
+        (points(None, (0, float("nan"), 0), None), r"at joint 1 \(b\); expected three finite numbers"),
+        (points(None, None, (0, 1e12, 0)), r"at joint 2 \(c\); expected three finite numbers"),
+        (frame(UNIT, UNIT, UNIT), "has no p; expected 3 joints"),
+        (points(None, None, None, q=(UNIT, UNIT, UNIT)), "expected positions in p alone"),
+    ],
+)
+def test_poisoned_positions(bad, told):
+    with pytest.raises(FrameError, match=told):
+        frame_points(bad, JOINTS)
+
+
+def test_positions_for_a_skeleton_of_rotations_are_told():
+    with pytest.raises(FrameError, match="has no q"):
+        frame_pose(points(None, None, None), JOINTS, "xyzw")
+    with pytest.raises(FrameError, match="expected quaternions in q alone"):
+        frame_pose(points(None, None, None, q=(UNIT, UNIT, UNIT)), JOINTS, "xyzw")

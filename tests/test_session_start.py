@@ -1,6 +1,5 @@
 """What `session.start` may ask for."""
 
-import numpy as np
 import pytest
 
 from bodies import model
@@ -21,11 +20,19 @@ def test_defaults_are_the_skeletons_own():
 
 
 def test_a_subset_of_joints_in_the_clients_order():
-    agreement = agreed(joints=("head", "spine"))
-    rotations, observed = agreement.arrange(np.array([[0, 0, 0, 1.0], [0, 1.0, 0, 0]]), np.array([True, False]))
-    assert rotations[2].tolist() == [0, 0, 0, 1]
-    assert rotations[0].tolist() == [0, 1, 0, 0]
-    assert observed.tolist() == [False, False, True, *[False] * 10]
+    pose = agreed(joints=("head", "spine")).pose_of(Frame(seq=0, t=0.0, q=((0, 0, 0, 1.0), None)))
+    assert pose.joints[2].tolist() == [0, 0, 0, 1]
+    assert pose.observed.tolist() == [False, False, True, *[False] * 10]
+
+
+def test_landmark_sensors_send_positions():
+    agreement = agreed(skeleton="coco17", joints=("left_elbow", "nose"))
+    pose = agreement.pose_of(Frame(seq=0, t=0.0, p=((1.0, 2.0, 3.0), None)))
+    assert pose.joints.shape == (17, 3)
+    assert pose.joints[7].tolist() == [1.0, 2.0, 3.0]
+    assert pose.observed.sum() == 1
+    with pytest.raises(FrameError, match="has no p; expected 2 joints"):
+        agreement.pose_of(Frame(seq=0, t=0.0, q=(None, None)))
 
 
 @pytest.mark.parametrize(

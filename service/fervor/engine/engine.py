@@ -65,14 +65,15 @@ class Engine:
         noisy = np.array([ticket.source.skeleton.noisy for ticket in tickets], np.bool_)  # [ticket]
         slots.clear(rows[fresh])
         old = Poses(slots.pose[rows], slots.observed[rows])
-        new, jumps, rejected = reject_jumps(adapt_all(tickets), old, slots.jumps[rows], noisy)
+        came, hinges = adapt_all(tickets, slots.hinges[rows])
+        new, jumps, rejected = reject_jumps(came, old, slots.jumps[rows], noisy)
         new = hold(new, old)
         memory = _Memory.of(slots, rows)
         for turn in range(max(len(ticket.steps) for ticket in tickets)):
             self._turn(tickets, turn, old, new, memory)
         moved = rows[posed]
         slots.pose[moved], slots.observed[moved] = new.rotations[posed], new.observed[posed]
-        slots.jumps[moved] = jumps[posed]
+        slots.jumps[moved], slots.hinges[moved] = jumps[posed], hinges[posed]
         slots.seen[moved] = new.observed[posed][:, UPPER_BODY].sum(axis=1)
         memory.store(slots, rows)
         jumped = np.where(posed, rejected.sum(axis=1), 0)

@@ -12,6 +12,8 @@ import numpy.typing as npt
 from fervor.rotations import IDENTITY, angle_between, slerp
 from fervor.session.events import Source, Ticket
 from fervor.skeletons.adapter import adapt
+from fervor.skeletons.landmarks import Landmarks
+from fervor.skeletons.positions import local_from_positions
 from fervor.skeletons.rig import JOINTS
 
 JUMP_RAD = np.radians(120.0)
@@ -29,23 +31,33 @@ class Poses:
     observed: npt.NDArray[np.bool_]  # [row, joint]
 
 
-def adapt_all(tickets: Sequence[Ticket]) -> Poses:
-    """The tickets' poses in the rig C13; tickets of one source are adapted in one go."""
+def adapt_all(tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]) -> tuple[Poses, npt.NDArray[np.float64]]:
+    """The tickets' poses in the rig C13; tickets of one source are adapted in one go.
+
+    Args:
+        tickets: the batch.
+        hinges: [row, limb, bone, 3] what landmark sensors remember of each body's limbs.
+
+    Returns:
+        the poses, and the hinges after them.
+    """
     rotations = np.tile(IDENTITY, (len(tickets), len(JOINTS), 1))
     observed = np.zeros((len(tickets), len(JOINTS)), np.bool_)
+    hinges = hinges.copy()
     by_source: dict[Source, list[int]] = {}
     for row, ticket in enumerate(tickets):
         if ticket.pose is not None:
             by_source.setdefault(ticket.source, []).append(row)
     for source, rows in by_source.items():
         poses = [pose for row in rows if (pose := tickets[row].pose) is not None]
-        rotations[rows], observed[rows] = adapt(
-            source.skeleton,
-            np.stack([pose.rotations for pose in poses]),
-            np.stack([pose.observed for pose in poses]),
-            axes=source.axes,
-        )
-    return Poses(rotations, observed)
+        joints = np.stack([pose.joints for pose in poses])  # [row, joint, 3 or 4]
+        seen = np.stack([pose.observed for pose in poses])  # [row, joint]
+        if isinstance(source.skeleton, Landmarks):
+            local = local_from_positions(source.skeleton, joints, seen, hinges[rows])
+            rotations[rows], observed[rows], hinges[rows] = local
+        else:
+            rotations[rows], observed[rows] = adapt(source.skeleton, joints, seen, axes=source.axes)
+    return Poses(rotations, observed), hinges
 
 
 def reject_jumps(

@@ -14,6 +14,7 @@ from fervor.errors import Overloaded
 from fervor.metadata import ModelMetadata
 from fervor.rotations import IDENTITY
 from fervor.session.lanes import LANES
+from fervor.skeletons.positions import no_hinges
 from fervor.skeletons.rig import JOINTS
 
 
@@ -26,6 +27,7 @@ class Slots:
         self.pose = np.tile(IDENTITY, (capacity, joints, 1))  # [slot, joint, 4] xyzw, the newest pose, holes held
         self.observed = np.zeros((capacity, joints), np.bool_)  # [slot, joint]
         self.jumps = np.zeros((capacity, joints), np.int64)  # [slot, joint] frames rejected in a row
+        self.hinges = no_hinges((capacity,))  # [slot, limb, bone, 3] landmark sensors: axes of limbs last bent
         self.states = {
             state.name: np.zeros((capacity, LANES, *state.shape), np.float32) for state in metadata.states
         }  # name → [slot, lane, *shape]
@@ -57,7 +59,7 @@ class Slots:
 
     def clear(self, slots: npt.NDArray[np.intp]) -> None:
         """Forget what these slots [any] hold; states are zeroed by the lanes that restart."""
-        self.pose[slots], self.observed[slots], self.jumps[slots] = IDENTITY, False, 0
+        self.pose[slots], self.observed[slots], self.jumps[slots], self.hinges[slots] = IDENTITY, False, 0, 0.0
         for slot in slots.tolist():
             self.histories.pop(slot, None)
         self.intensity[slots], self.by_emotion[slots], self.seen[slots] = np.nan, 0.0, 0

@@ -75,6 +75,9 @@ class SessionStart(_Message):
 Quaternion = Annotated[tuple[float, float, float, float], Field(description="zero or null means untracked")]
 
 
+Vector = tuple[float, float, float]
+
+
 class Frame(_Message):
     """One timestamped pose of one body."""
 
@@ -82,7 +85,10 @@ class Frame(_Message):
     body: BodyId = "0"
     seq: int = Field(ge=0, le=2**53, description="rises by one or more from frame to frame")
     t: float | None = Field(None, allow_inf_nan=False, description="seconds, client clock; needed by clock `time`")
-    q: tuple[Quaternion | None, ...] = Field(description="one quaternion a joint; null where untracked")
+    q: tuple[Quaternion | None, ...] | None = Field(None, description="one quaternion a joint; null where untracked")
+    p: tuple[Vector | None, ...] | None = Field(
+        None, description="landmark sensors, in place of q: one position a joint, right-handed, any unit"
+    )
     mask: tuple[bool, ...] | None = Field(None, description="false where untracked")
     emotion: Emotion | None = Field(None, description="a new label; absent: the old one holds; `unknown` clears it")
 
@@ -106,9 +112,6 @@ class BodyEnd(_Message):
 
     type: Literal["body.end"] = "body.end"
     body: BodyId
-
-
-Vector = tuple[float, float, float]
 
 
 class SessionCalibrate(_Message):

@@ -7,7 +7,10 @@ import numpy as np
 from fervor.errors import InputError
 from fervor.protocol.messages import SessionCalibrate
 from fervor.session.events import Pose, Source
+from fervor.skeletons.binds import Quaternion
 from fervor.skeletons.calibration import Calibration, calibrate, facing
+from fervor.skeletons.landmarks import Landmarks
+from fervor.skeletons.skeleton import Axes, Skeleton
 
 
 @dataclass(slots=True)
@@ -15,9 +18,22 @@ class Calibrating:
     """A calibration under way."""
 
     request: SessionCalibrate
-    source: Source
+    skeleton: Skeleton
+    axes: Axes
+    person: Quaternion
     _poses: list[Pose] = field(default_factory=list)
     _start: float | None = None  # seconds, client clock
+
+    @classmethod
+    def begin(cls, request: SessionCalibrate, source: Source) -> "Calibrating":
+        """A calibration of a session's source.
+
+        Raises:
+            InputError: a landmark sensor, which has no joint axes to align, or directions that make no sense.
+        """
+        if isinstance(source.skeleton, Landmarks):
+            raise InputError(f"{source.skeleton.name!r} sends positions, which need no calibration")
+        return cls(request, source.skeleton, source.axes, facing(request.up, request.forward))
 
     def add(self, time: float, pose: Pose) -> Calibration | None:
         """Take a frame; the calibration once the pose was held long enough.
@@ -33,12 +49,12 @@ class Calibrating:
         if time - self._start < self.request.seconds:
             return None
         return calibrate(
-            self.source.skeleton,
-            np.stack([pose.rotations for pose in self._poses]),
+            self.skeleton,
+            np.stack([pose.joints for pose in self._poses]),
             np.stack([pose.observed for pose in self._poses]),
-            axes=self.source.axes,
+            axes=self.axes,
             pose=self.request.pose,
-            person=facing(self.request.up, self.request.forward),
+            person=self.person,
         )
 
 

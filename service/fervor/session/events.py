@@ -12,6 +12,7 @@ from fervor.errors import CloseCode
 from fervor.protocol.messages import Flag, ServerMessage
 from fervor.session.label import Label
 from fervor.session.lanes import Schedule
+from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.skeleton import Axes, Skeleton
 
 
@@ -39,17 +40,17 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What kind of rotations a session sends; poses of equal sources are adapted together."""
+    """What kind of joints a session sends; poses of equal sources are adapted together."""
 
-    skeleton: Skeleton
+    skeleton: Skeleton | Landmarks
     axes: Axes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """The rotations of one frame in the order of its source's joints."""
+    """The joints of one frame in the order of its source's."""
 
-    rotations: npt.NDArray[np.float64]  # [joint, 4] xyzw
+    joints: npt.NDArray[np.float64]  # [joint, 4] rotations xyzw, or [joint, 3] positions of landmarks
     observed: npt.NDArray[np.bool_]  # [joint]
 
 

@@ -30,7 +30,6 @@ from fervor.protocol.messages import (
     SessionStarted,
     Totals,
 )
-from fervor.protocol.poses import frame_pose
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
 from fervor.session.calibrating import Calibrating
@@ -39,7 +38,6 @@ from fervor.session.groups import Groups
 from fervor.session.label import NO_LABEL, make_label
 from fervor.session.start import Agreement, agree
 from fervor.session.state import SessionState, transition
-from fervor.skeletons.calibration import facing
 from fervor.skeletons.skeleton import Skeleton
 
 
@@ -134,8 +132,7 @@ class Session:
             case BodyEnd():
                 return self._end_body(self._body(message.body))
             case SessionCalibrate():
-                facing(message.up, message.forward)
-                self._calibrating = Calibrating(message, self._agreed.terms.source)
+                self._calibrating = Calibrating.begin(message, self._agreed.terms.source)
                 return []
             case Ping():
                 return [Reply(Pong(id=message.id))]
@@ -172,8 +169,7 @@ class Session:
     def _plan(self, frame: Frame, group: int | None, place: int) -> list[Event]:
         agreement = self._agreed
         time = agreement.time_of(frame)
-        rotations, observed = frame_pose(frame, agreement.joints, agreement.order)
-        pose = Pose(*agreement.arrange(rotations, observed))
+        pose = agreement.pose_of(frame)
         body = self._bodies.get(frame.body)
         if body is not None and (answer := body.answered(frame.seq)) is not None:
             self._count("duplicate")

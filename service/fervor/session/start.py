@@ -11,11 +11,13 @@ from fervor.emotions import emotion_vector
 from fervor.errors import FrameError, InputError
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Emotion, Frame, SessionStart
+from fervor.protocol.poses import frame_points, frame_pose
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
-from fervor.session.events import Source
+from fervor.session.events import Pose, Source
 from fervor.skeletons.adapter import check_axes
-from fervor.skeletons.catalog import skeleton
+from fervor.skeletons.catalog import source
+from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.skeleton import QuaternionOrder, Skeleton
 
 
@@ -47,16 +49,22 @@ class Agreement:
             return frame.seq * self.frame_s
         raise FrameError(f"frame {frame.seq} of body {frame.body!r} has no t; clock 'time' needs seconds")
 
-    def arrange(
-        self, rotations: npt.NDArray[np.float64], observed: npt.NDArray[np.bool_]
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-        """Joints as sent ([joint sent, 4], [joint sent]) in the skeleton's order; the others are unobserved."""
+    def pose_of(self, frame: Frame) -> Pose:
+        """The frame's joints, checked, in the order of the source; joints that are not sent are unobserved.
+
+        Raises:
+            FrameError: the frame is poisoned; see `fervor.protocol.poses`.
+        """
+        if isinstance(self.terms.source.skeleton, Landmarks):
+            joints, observed = frame_points(frame, self.joints)
+        else:
+            joints, observed = frame_pose(frame, self.joints, self.order)
         if self.places is None:
-            return rotations, observed
+            return Pose(joints, observed)
         count = len(self.terms.source.skeleton.joints)
-        arranged, seen = np.zeros((count, 4)), np.zeros(count, np.bool_)
-        arranged[self.places], seen[self.places] = rotations, observed
-        return arranged, seen
+        arranged, seen = np.zeros((count, joints.shape[1])), np.zeros(count, np.bool_)
+        arranged[self.places], seen[self.places] = joints, observed
+        return Pose(arranged, seen)
 
     def aligned(self, skeleton: Skeleton) -> "Agreement":
         """The same agreement for the same sensor under another alignment."""
@@ -72,21 +80,22 @@ def agree(
         InputError: an unknown skeleton, joint or emotion, or axes that the skeleton can't have.
     """
     known = _known(start.skeleton, skeletons)
-    source = Source(known, start.axes or known.axes)
-    check_axes(source.skeleton, source.axes)
+    sensor = Source(known, "global" if isinstance(known, Landmarks) else start.axes or known.axes)
+    if isinstance(known, Skeleton):
+        check_axes(known, sensor.axes)
     if start.emotion is not None:
         emotion_vector(start.emotion)
     return Agreement(
         terms=Terms(
             metadata=metadata,
-            source=source,
+            source=sensor,
             clock=start.clock,
             memory=start.memory,
             emotion_ttl_s=start.emotion_ttl_s,
             by_emotion=start.by_emotion,
         ),
         joints=start.joints or known.joints,
-        order=start.quaternion or known.quaternion,
+        order=start.quaternion or (known.quaternion if isinstance(known, Skeleton) else "xyzw"),
         latest=start.delivery == "latest",
         emotion=start.emotion,
         frame_s=1.0 / (start.nominal_hz or metadata.rate_hz),
@@ -94,10 +103,10 @@ def agree(
     )
 
 
-def _known(asked: str | SkeletonSpec, skeletons: Mapping[str, Skeleton]) -> Skeleton:
+def _known(asked: str | SkeletonSpec, skeletons: Mapping[str, Skeleton]) -> Skeleton | Landmarks:
     if isinstance(asked, SkeletonSpec):
         return asked.to_skeleton()
-    return skeletons.get(asked) or skeleton(asked)
+    return skeletons.get(asked) or source(asked)
 
 
 def _places(sent: tuple[str, ...] | None, known: tuple[str, ...], name: str) -> npt.NDArray[np.intp] | None:
