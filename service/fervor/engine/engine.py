@@ -15,6 +15,7 @@ from fervor.engine.posing import Poses, adapt_all, between, hold, reject_jumps
 from fervor.engine.slots import Slots
 from fervor.errors import EngineError
 from fervor.model import Floats, Model
+from fervor.session.checkpoint import Memory
 from fervor.session.events import Outcome, Step, Ticket
 from fervor.session.lanes import LANES
 from fervor.skeletons.rig import UPPER_BODY
@@ -47,6 +48,10 @@ class Engine:
     def release(self, slot: int) -> None:
         """Give a slot back; no ticket of it may be under way."""
         self.slots.release(slot)
+
+    def restore(self, slot: int, memory: Memory) -> None:
+        """Put what a checkpoint remembers into a slot that was just claimed; raises CheckpointMismatch."""
+        self.slots.restore(slot, memory)
 
     def run(self, tickets: Sequence[Ticket]) -> list[Outcome | EngineError]:
         """The outcome of each ticket, at most one a slot. A ticket that makes the model fail fails alone."""
@@ -84,6 +89,7 @@ class Engine:
                 memory.by_emotion[row],
                 int(slots.seen[slot]),
                 int(jumped[row]),
+                slots.recall(slot) if tickets[row].checkpoint is not None else None,
             )
 
     def _turn(self, tickets: Sequence[Ticket], number: int, old: Poses, new: Poses, memory: "_Memory") -> None:

@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 from fervor.emotions import EMOTIONS
 from fervor.engine.history import History
-from fervor.errors import Overloaded
+from fervor.errors import CheckpointMismatch, Overloaded
 from fervor.metadata import ModelMetadata
 from fervor.rotations import IDENTITY
+from fervor.session.checkpoint import Memory
 from fervor.session.lanes import LANES
 from fervor.skeletons.positions import no_hinges
 from fervor.skeletons.rig import JOINTS
@@ -63,3 +64,39 @@ class Slots:
         for slot in slots.tolist():
             self.histories.pop(slot, None)
         self.intensity[slots], self.by_emotion[slots], self.seen[slots] = np.nan, 0.0, 0
+
+    def recall(self, slot: int) -> Memory:
+        """Copies of all that a slot holds."""
+        history = self.histories.get(slot)
+        window = {} if history is None else {"history": history.rotations, "history_mask": history.mask}
+        return Memory({name: array[slot].copy() for name, array in self._arrays().items()} | window)
+
+    def restore(self, slot: int, memory: Memory) -> None:
+        """Make a slot hold what `recall` gave.
+
+        Raises:
+            CheckpointMismatch: arrays of another model.
+        """
+        arrays = dict(memory.arrays)
+        rotations, mask = arrays.pop("history", None), arrays.pop("history_mask", None)
+        known = self._arrays()
+        shapes = {name: (array.shape[1:], array.dtype) for name, array in known.items()}
+        if {name: (array.shape, array.dtype) for name, array in arrays.items()} != shapes:
+            raise CheckpointMismatch("the checkpoint's state does not fit this model; start the body anew")
+        for name, array in arrays.items():
+            known[name][slot] = array
+        if rotations is not None and mask is not None:
+            self.histories[slot] = History(rotations.astype(np.float32), mask.astype(np.float32))
+
+    def _arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """Everything kept by slot, by name."""
+        return {
+            "pose": self.pose,
+            "observed": self.observed,
+            "jumps": self.jumps,
+            "hinges": self.hinges,
+            "intensity": self.intensity,
+            "by_emotion": self.by_emotion,
+            "seen": self.seen,
+            **{f"state.{name}": state for name, state in self.states.items()},
+        }

@@ -69,7 +69,10 @@ class SessionStart(_Message):
         None, gt=0, description="seconds a label holds; default: for ever, probabilities 2 s"
     )
     by_emotion: bool = Field(default=False, description="estimates carry the intensity under every emotion too")
-    resume: tuple[str, ...] = Field((), description="checkpoint tokens to go on from")
+    checkpoint_s: float | None = Field(
+        None, ge=0.1, description="seconds between the checkpoints of a body, client clock; absent: none are sent"
+    )
+    resume: tuple[str, ...] = Field((), max_length=64, description="checkpoint tokens to go on from, one a body")
 
 
 Quaternion = Annotated[tuple[float, float, float, float], Field(description="zero or null means untracked")]
@@ -172,6 +175,14 @@ class Limits(_Message):
     body_idle_s: float = 10.0
 
 
+class Resumed(_Message):
+    """A body that goes on from a checkpoint."""
+
+    body: str
+    seq: int = Field(description="newest frame that the checkpoint knows; replay those after it")
+    same_runtime: bool = Field(description="estimates will be equal to the bit; else to 1e-6")
+
+
 class SessionStarted(_Message):
     """The answer to `session.start`."""
 
@@ -182,6 +193,7 @@ class SessionStarted(_Message):
     limits: Limits
     joints: tuple[str, ...] = Field(description="joints expected in every frame, in this order")
     fingerprint: str = Field(description="runtime whose estimates are equal to the bit")
+    resumed: tuple[Resumed, ...] = ()
 
 
 class Estimate(_Message):
@@ -216,6 +228,22 @@ class SessionCalibrated(_Message):
     frames: int
     spread_deg: float = Field(description="largest deviation of a segment from its mean, degrees")
     unseen: tuple[str, ...] = Field(description="segments that were never tracked; they keep their alignment")
+
+
+class Checkpoint(_Message):
+    """Everything needed to go on with a body after its frame `seq`, on any service with the same key."""
+
+    type: Literal["checkpoint"] = "checkpoint"
+    body: str
+    seq: int
+    token: str = Field(description="signed; keep it as it is")
+
+
+class GoingAway(_Message):
+    """The service stops: last checkpoints follow, then it closes with 1012. Connect again and resume."""
+
+    type: Literal["going_away"] = "going_away"
+    seconds: float = Field(description="time until the service closes at the latest")
 
 
 class Pong(_Message):
@@ -257,5 +285,6 @@ class SessionEnded(_Message):
 
 
 ServerMessage = Annotated[
-    SessionStarted | Estimate | Estimates | SessionCalibrated | Pong | Error | SessionEnded, Field(discriminator="type")
+    SessionStarted | Estimate | Estimates | SessionCalibrated | Checkpoint | GoingAway | Pong | Error | SessionEnded,
+    Field(discriminator="type"),
 ]

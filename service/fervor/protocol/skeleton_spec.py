@@ -5,6 +5,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from fervor.errors import InputError
 from fervor.rotations import IDENTITY, normalise
+from fervor.skeletons.binds import Quaternion
 from fervor.skeletons.rig import SEGMENTS
 from fervor.skeletons.skeleton import ROOT, Axes, QuaternionOrder, Skeleton
 
@@ -62,7 +63,7 @@ class SkeletonSpec(BaseModel):
         """The skeleton itself."""
         bind = np.tile(IDENTITY, (len(SEGMENTS), 1))
         for segment, rotation in self.bind.items():
-            bind[SEGMENTS.index(segment)] = normalise(np.array(rotation, np.float64))
+            bind[SEGMENTS.index(segment)] = _unit(np.array(rotation, np.float64))
         bind.setflags(write=False)
         return Skeleton(
             name=self.name,
@@ -100,3 +101,8 @@ class SkeletonSpec(BaseModel):
             quaternion=skeleton.quaternion,
             noisy=skeleton.noisy,
         )
+
+
+def _unit(rotation: Quaternion) -> Quaternion:
+    """At unit length; one that is there already keeps its bits, so that JSON loses none."""
+    return rotation if abs(float(np.sum(rotation * rotation)) - 1.0) < 1e-12 else normalise(rotation)

@@ -3,14 +3,18 @@
 A body holds scalars only; its recurrent tensors and poses live in the engine under its slot.
 """
 
+import math
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from fervor.emotions import EMOTIONS, UNKNOWN
 from fervor.levels import LevelState, next_level
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
+from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
 from fervor.session.label import NO_LABEL, Label, make_label
 from fervor.session.lanes import schedule, window_steps
@@ -37,6 +41,7 @@ class Terms:
     memory: Memory = "staggered"
     emotion_ttl_s: float | None = None
     by_emotion: bool = False
+    checkpoint_s: float | None = None
 
 
 class Body:
@@ -54,6 +59,7 @@ class Body:
         self._level: LevelState | None = None
         self._emotion = UNKNOWN
         self._pending: tuple[Flag, ...] = ()
+        self._next_checkpoint = -math.inf  # seconds
         self._answers: OrderedDict[int, Estimate] = OrderedDict()
         self._enough = _enough(terms)
 
@@ -65,7 +71,6 @@ class Body:
     def reset(self, flag: Flag = "reset") -> None:
         """Forget poses, states and level; the next frame is a first one and says so."""
         self._timeline = None
-        self._level = None
         self._pending = (flag,)
 
     def adopt(self, terms: Terms) -> None:
@@ -104,7 +109,7 @@ class Body:
             self._last = time
         flags: tuple[Flag, ...] = moved.flags
         if moved.fresh:
-            flags, self._pending, self._level = (*self._pending, *flags), (), None
+            flags, self._pending = (*self._pending, *flags), ()
         if lost:
             flags = (*flags, "lost")
         self._timeline = moved.timeline
@@ -121,11 +126,78 @@ class Body:
             flags=flags,
             since=moved.timeline.origin if moved.timeline else time,
             group=group,
+            checkpoint=self._keep() if self._is_due(time) else None,
         )
+
+    def snapshot(self, time: float) -> Ticket:
+        """A ticket that brings no work and no estimate, but a checkpoint of the body as it is after all others."""
+        self.in_flight += 1
+        return Ticket(
+            slot=self.slot,
+            body=self.name,
+            seq=self.newest_seq,
+            time=time,
+            source=self._terms.source,
+            pose=None,
+            fresh=False,
+            steps=(),
+            flags=(),
+            since=time,
+            answer=False,
+            checkpoint=self._keep(),
+        )
+
+    def bookkeeping(self, ticket: Ticket) -> Bookkeeping:
+        """What the body held right after `ticket` was concluded; to be called then.
+
+        Raises:
+            ValueError: no checkpoint was due with this ticket.
+        """
+        if ticket.checkpoint is None:
+            raise ValueError(f"no checkpoint was due with frame {ticket.seq}")
+        level = None if self._level is None else (self._level.level, self._level.since)
+        return ticket.checkpoint.model_copy(update={"level": level, "emotion": self._emotion})
+
+    @classmethod
+    def restore(cls, kept: Bookkeeping, slot: int, terms: Terms) -> "Body":
+        """The body as it was, in another slot."""
+        vector, name, until = kept.label
+        body = cls(kept.name, slot, terms, Label(np.array(vector, np.float32), name, until))
+        body.newest_seq = kept.newest_seq
+        body._timeline = None if kept.timeline is None else Timeline(*kept.timeline)
+        body._last = kept.last
+        body._pending = kept.pending
+        body._level = None if kept.level is None else LevelState(*kept.level)
+        body._emotion = kept.emotion
+        return body
+
+    def _keep(self) -> Bookkeeping:
+        """What was planned so far; level and emotion follow when the outcome is there."""
+        line, label = self._timeline, self._label
+        return Bookkeeping(
+            name=self.name,
+            newest_seq=self.newest_seq,
+            timeline=None if line is None else (line.origin, line.last, line.steps),
+            last=self._last,
+            label=(tuple(label.vector.tolist()), label.name, label.until),
+            pending=self._pending,
+            level=None,
+            emotion=UNKNOWN,
+        )
+
+    def _is_due(self, time: float) -> bool:
+        """Whether a checkpoint goes with the frame at `time`: one in every span of `checkpoint_s`."""
+        span = self._terms.checkpoint_s
+        if span is None or (self._next_checkpoint - span <= time < self._next_checkpoint):
+            return False
+        self._next_checkpoint = (math.floor(time / span) + 1) * span
+        return True
 
     def conclude(self, ticket: Ticket, outcome: Outcome) -> Estimate:
         """The estimate for a ticket, in the order in which tickets were planned."""
         self.in_flight -= 1
+        if ticket.fresh:
+            self._level = None
         if ticket.steps:
             self._emotion = ticket.steps[-1].label.name
         if ticket.steps and outcome.intensity is not None:

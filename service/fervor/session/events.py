@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fervor.errors import CloseCode
 from fervor.protocol.messages import Flag, ServerMessage
+from fervor.session.checkpoint import Bookkeeping, Memory
 from fervor.session.label import Label
 from fervor.session.lanes import Schedule
 from fervor.skeletons.landmarks import Landmarks
@@ -36,6 +37,14 @@ class Release:
     """Give the slot back to the engine, after all earlier tickets."""
 
     slot: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Restore:
+    """Put what a checkpoint remembers into a slot that was just claimed, before its first ticket."""
+
+    slot: int
+    memory: Memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +95,10 @@ class Ticket:
     since: float  # seconds, time of the last reset
     group: int | None = None
     """The `frames` message it came in."""
+    answer: bool = True
+    """Whether it is a frame, to be answered by an estimate; else it only asks for a checkpoint."""
+    checkpoint: Bookkeeping | None = None
+    """What the body held right after this ticket was planned, where a checkpoint is due."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +112,8 @@ class Outcome:
     """Upper-body joints of the rig observed in this frame."""
     jumped: int
     """Joints whose rotation was rejected as a jump."""
+    memory: Memory | None = None
+    """What the engine holds of the body after this ticket, where a checkpoint is due."""
 
 
-Event = Reply | Close | Release | Ticket
+Event = Reply | Close | Release | Restore | Ticket

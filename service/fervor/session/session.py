@@ -4,14 +4,15 @@ The caller's duties: hand every message to `receive` (or, if it could not be dec
 every `Ticket` to the engine in order and hand each outcome to `conclude`; call `lost` once when the connection is gone.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fervor.errors import CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
+from fervor.errors import CheckpointUnknown, CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
+    Checkpoint,
     ClientMessage,
     Error,
     Estimate,
@@ -22,6 +23,7 @@ from fervor.protocol.messages import (
     ModelInfo,
     Ping,
     Pong,
+    Resumed,
     SessionCalibrate,
     SessionCalibrated,
     SessionEnd,
@@ -33,7 +35,8 @@ from fervor.protocol.messages import (
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
 from fervor.session.calibrating import Calibrating
-from fervor.session.events import Close, Event, Outcome, Pose, Release, Reply, Ticket
+from fervor.session.checkpoint import Bond, pack, unpack
+from fervor.session.events import Close, Event, Outcome, Pose, Release, Reply, Restore, Ticket
 from fervor.session.groups import Groups
 from fervor.session.label import NO_LABEL, make_label
 from fervor.session.start import Agreement, agree
@@ -51,6 +54,10 @@ class Host:
     fingerprint: str
     claim: Callable[[], int]
     """Takes a free slot of the engine; raises Overloaded."""
+    seal: Callable[[bytes], str] | None = None
+    """Signs a checkpoint; None on a service that gives none."""
+    unseal: Callable[[str], bytes] | None = None
+    """Opens a token; raises CheckpointUnknown."""
     skeletons: Mapping[str, Skeleton] = field(default_factory=dict)
     """Skeletons beside the catalogue's, by name: calibrations kept on this service."""
 
@@ -103,7 +110,9 @@ class Session:
         if isinstance(outcome, EngineError):
             events += self._fail(ticket, body, outcome)
         else:
-            events += self._deliver(ticket.group, place, body.conclude(ticket, outcome), body)
+            estimate = body.conclude(ticket, outcome)
+            events += self._deliver(ticket.group, place, estimate, body) if ticket.answer else []
+            events += self._checkpoint(ticket, body, outcome)
         if ticket.group is not None:
             events += self._close_group(ticket.group)
         if self.state is SessionState.ENDING and not self._tickets:
@@ -144,17 +153,64 @@ class Session:
             self._agreement = agree(message, self._host.metadata, self._host.skeletons)
         except InputError as error:
             raise ProtocolError(error.message) from None
-        return [
-            Reply(
-                SessionStarted(
-                    session_id=self.session_id,
-                    model=self._host.model,
-                    limits=self._host.limits,
-                    joints=self._agreement.joints,
-                    fingerprint=self._host.fingerprint,
-                )
-            )
-        ]
+        resumed, restores = self._resume(message.resume)
+        started = SessionStarted(
+            session_id=self.session_id,
+            model=self._host.model,
+            limits=self._host.limits,
+            joints=self._agreement.joints,
+            fingerprint=self._host.fingerprint,
+            resumed=resumed,
+        )
+        return [Reply(started), *restores]
+
+    def _resume(self, tokens: Sequence[str]) -> tuple[tuple[Resumed, ...], list[Event]]:
+        """Bodies from checkpoints; all or none.
+
+        Raises:
+            CheckpointUnknown: a token that this service can't take.
+            CheckpointMismatch: a checkpoint of another model or other terms.
+        """
+        if tokens and self._host.unseal is None:
+            raise CheckpointUnknown("this service gives and takes no checkpoints; start without resume")
+        opened = [unpack(self._host.unseal(token), self._bond) for token in tokens if self._host.unseal]
+        if len({kept.body.name for kept in opened}) != len(opened):
+            raise ProtocolError("resume names a body twice; expected its newest checkpoint only")
+        resumed: list[Resumed] = []
+        restores: list[Event] = []
+        for kept in opened:
+            body = Body.restore(kept.body, self._host.claim(), self._agreed.terms)
+            self._bodies[body.name] = body
+            restores.append(Restore(body.slot, kept.memory))
+            resumed.append(Resumed(body=body.name, seq=body.newest_seq, same_runtime=kept.same_runtime))
+        return tuple(resumed), restores
+
+    def checkpoints(self) -> list[Event]:
+        """Ask for a checkpoint of every body, after all that is under way; none unless the client takes them."""
+        if self.state is not SessionState.OPEN or self._agreed.terms.checkpoint_s is None:
+            return []
+        tickets: list[Event] = []
+        for body in self._bodies.values():
+            if body.last is not None:
+                ticket = body.snapshot(body.last)
+                self._tickets[ticket] = (body, -1)
+                tickets.append(ticket)
+        return tickets
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is under way."""
+        return bool(self._tickets)
+
+    @property
+    def _bond(self) -> Bond:
+        return Bond(self._host.model.sha256, self._host.fingerprint, self._agreed.digest)
+
+    def _checkpoint(self, ticket: Ticket, body: Body, outcome: Outcome) -> list[Event]:
+        if ticket.checkpoint is None or outcome.memory is None or self._host.seal is None:
+            return []
+        token = self._host.seal(pack(self._bond, body.bookkeeping(ticket), outcome.memory))
+        return [Reply(Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=token))]
 
     def _frame(self, frame: Frame, group: int | None = None, place: int = 0) -> list[Event]:
         """The work of one frame. A bad one is told and leaves no trace."""

@@ -14,6 +14,7 @@ from fervor.protocol.messages import Emotion, Frame, SessionStart
 from fervor.protocol.poses import frame_points, frame_pose
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
+from fervor.session.checkpoint import digest
 from fervor.session.events import Pose, Source
 from fervor.skeletons.adapter import check_axes
 from fervor.skeletons.catalog import source
@@ -48,6 +49,24 @@ class Agreement:
         if self.terms.clock == "frames":
             return frame.seq * self.frame_s
         raise FrameError(f"frame {frame.seq} of body {frame.body!r} has no t; clock 'time' needs seconds")
+
+    @property
+    def digest(self) -> str:
+        """What a checkpoint is bound to: everything agreed that shapes an estimate or the meaning of a frame."""
+        terms, known = self.terms, self.terms.source.skeleton
+        return digest(
+            {
+                "joints": self.joints,
+                "order": self.order,
+                "axes": terms.source.axes,
+                "skeleton": known.name,
+                "tree": known.joints if isinstance(known, Landmarks) else (known.joints, known.parents, known.drives),
+                "bind": b"" if isinstance(known, Landmarks) else known.bind.tobytes(),
+                "clock": (terms.clock, self.frame_s),
+                "memory": terms.memory,
+                "emotion": (self.emotion, terms.emotion_ttl_s),
+            }
+        )
 
     def pose_of(self, frame: Frame) -> Pose:
         """The frame's joints, checked, in the order of the source; joints that are not sent are unobserved.
@@ -93,6 +112,7 @@ def agree(
             memory=start.memory,
             emotion_ttl_s=start.emotion_ttl_s,
             by_emotion=start.by_emotion,
+            checkpoint_s=start.checkpoint_s,
         ),
         joints=start.joints or known.joints,
         order=start.quaternion or (known.quaternion if isinstance(known, Skeleton) else "xyzw"),

@@ -1,0 +1,202 @@
+"""A body resumed elsewhere goes on to the bit, wherever it was cut."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bodies import host, model, motion
+from fervor.engine.engine import Engine
+from fervor.errors import CheckpointMismatch, CheckpointUnknown
+from fervor.protocol.messages import Checkpoint, Error, Estimate, Frame, SessionStart, SessionStarted
+from fervor.session.checkpoint import Bond, Bookkeeping, Memory, pack, unpack
+from fervor.session.events import Close, Release, Reply, Restore, Ticket
+from fervor.session.sealing import Sealer
+from fervor.session.session import Session
+
+SEALER = Sealer((b"key",), 60.0)
+
+
+class Replica:
+    """A service with the common key, and one session on it."""
+
+    def __init__(self) -> None:
+        self.engine = Engine(model(), capacity=8)
+        base = host(self.engine.claim)
+        self.session = Session(
+            "s",
+            type(base)(
+                base.model,
+                base.metadata,
+                base.limits,
+                base.fingerprint,
+                base.claim,
+                seal=lambda content: SEALER.seal(content, 0.0),
+                unseal=lambda token: SEALER.open(token, 1.0),
+            ),
+        )
+        self.closed: Close | None = None
+
+    def say(self, message) -> list:
+        return self.carry(self.session.receive(message))
+
+    def carry(self, events) -> list:
+        said, queue = [], list(events)
+        while queue:
+            match queue.pop(0):
+                case Reply(message):
+                    said.append(message)
+                case Ticket() as ticket:
+                    queue = [*self.session.conclude(ticket, self.engine.run([ticket])[0]), *queue]
+                case Restore(slot, memory):
+                    self.engine.restore(slot, memory)
+                case Release(slot):
+                    self.engine.release(slot)
+                case Close() as close:
+                    self.closed = close
+        return said
+
+
+def estimates(said) -> list[Estimate]:
+    return [message for message in said if isinstance(message, Estimate)]
+
+
+def run(replica: Replica, frames) -> list:
+    return [said for frame in frames for said in replica.say(frame)]
+
+
+def a_life(seed: int, *, count: int = 260, joints: int = 13, body: str = "eve") -> list[Frame]:
+    """Frames with jitter, gaps, lost joints, labels that come and expire."""
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.choice([0.01, 0.033, 0.034, 0.3, 0.7, 1.4], count, p=[0.1, 0.4, 0.44, 0.03, 0.02, 0.01]))
+    poses = motion(count, seed=seed, joints=joints)
+    labels = [None, "joy", {"fear": 0.6, "joy": 0.3}, "unknown"]
+    return [
+        Frame(
+            body=body,
+            seq=seq,
+            t=float(times[seq]),
+            q=tuple(tuple(q) if random.random() > 0.03 else None for q in poses[seq]),
+            emotion=labels[random.integers(4)] if random.random() < 0.05 else None,
+        )
+        for seq in range(count)
+    ]
+
+
+@pytest.mark.parametrize("memory", ["staggered", "stateful", "window"])
+@pytest.mark.parametrize("skeleton", ["c13", "kinect_v2"])
+@settings(max_examples=5, deadline=None)
+@given(seed=st.integers(0, 1000), cuts=st.lists(st.integers(1, 259), min_size=1, max_size=4, unique=True))
+def test_resumed_equals_uninterrupted_to_the_bit(memory, skeleton, seed, cuts):
+    start = SessionStart(skeleton=skeleton, memory=memory, checkpoint_s=1.0, emotion="joy", by_emotion=True)
+    frames = a_life(seed, joints=25 if skeleton == "kinect_v2" else 13)
+    whole = Replica()
+    whole.say(start)
+    expected = {estimate.seq: estimate for estimate in estimates(run(whole, frames))}
+
+    got: dict[int, Estimate] = {}
+    replica, token, after = Replica(), None, 0
+    replica.say(start)
+    for cut in [*sorted(cuts), len(frames)]:
+        for said in run(replica, frames[after:cut]):
+            if isinstance(said, Checkpoint):
+                token, after = said.token, said.seq + 1
+            elif isinstance(said, Estimate):
+                assert got.setdefault(said.seq, said) == said  # a replay repeats, to the bit
+        replica = Replica()  # the other one was killed here
+        (started,) = replica.say(start.model_copy(update={"resume": (token,)} if token else {}))
+        assert isinstance(started, SessionStarted)
+        if token:
+            assert [(r.body, r.seq, r.same_runtime) for r in started.resumed] == [("eve", after - 1, True)]
+    assert got == expected
+
+
+def test_a_checkpoint_a_second_and_none_unless_asked():
+    asked, silent = Replica(), Replica()
+    asked.say(SessionStart(checkpoint_s=1.0))
+    silent.say(SessionStart())
+    frames = [Frame(seq=k, t=k / 30, q=tuple(map(tuple, motion(1)[0]))) for k in range(151)]
+    kept = [said for said in run(asked, frames) if isinstance(said, Checkpoint)]
+    assert [checkpoint.seq for checkpoint in kept] == [0, 30, 60, 90, 120, 150]
+    assert not any(isinstance(said, Checkpoint) for said in run(silent, frames))
+
+
+def test_the_last_checkpoint_of_a_drain_covers_everything():
+    replica, start = Replica(), SessionStart(checkpoint_s=60.0)
+    replica.say(start)
+    frames = a_life(3)
+    run(replica, frames[:200])
+    (last,) = replica.carry(replica.session.checkpoints())
+    assert last.seq == 199
+    assert not replica.session.busy
+    whole, other = Replica(), Replica()
+    whole.say(start)
+    other.say(start.model_copy(update={"resume": (last.token,)}))
+    assert estimates(run(whole, frames))[200:] == estimates(run(other, frames[200:]))
+
+
+def test_several_bodies_resume_together():
+    replica, start = Replica(), SessionStart(checkpoint_s=1.0)
+    replica.say(start)
+    lives = [a_life(seed, body=name, count=90) for seed, name in enumerate("abc")]
+    mixed = [frame for trio in zip(*lives, strict=True) for frame in trio]
+    tokens = {said.body: said for said in run(replica, mixed) if isinstance(said, Checkpoint)}
+    other = Replica()
+    (started,) = other.say(start.model_copy(update={"resume": tuple(kept.token for kept in tokens.values())}))
+    assert {r.body: r.seq for r in started.resumed} == {name: kept.seq for name, kept in tokens.items()}
+    assert other.engine.slots.taken == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "close"),
+    [
+        ({"memory": "stateful"}, "checkpoint_mismatch", 4410),
+        ({"emotion": "fear"}, "checkpoint_mismatch", 4410),
+        ({"skeleton": "kinect_v2"}, "checkpoint_mismatch", 4410),
+        ({"resume": ("garbage",)}, "checkpoint_unknown", 4404),
+    ],
+)
+def test_other_terms_or_garbage_are_refused_and_hold_nothing(changes, code, close):
+    replica, start = Replica(), SessionStart(checkpoint_s=1.0)
+    replica.say(start)
+    (kept,) = [s for s in replica.say(a_life(1)[0]) if isinstance(s, Checkpoint)]
+    other = Replica()
+    (error,) = other.say(start.model_copy(update={"resume": (kept.token,), **changes}))
+    assert isinstance(error, Error)
+    assert (error.code, error.fatal, other.closed.code) == (code, True, close)
+    assert other.engine.slots.taken == 0
+
+
+def test_the_same_body_twice_is_refused():
+    replica, start = Replica(), SessionStart(checkpoint_s=1.0)
+    replica.say(start)
+    (kept,) = [s for s in replica.say(a_life(1)[0]) if isinstance(s, Checkpoint)]
+    (error,) = Replica().say(start.model_copy(update={"resume": (kept.token, kept.token)}))
+    assert "names a body twice" in error.message
+
+
+BODY = Bookkeeping(
+    name="e",
+    newest_seq=1,
+    timeline=None,
+    last=None,
+    label=((0.0,) * 11, "unknown", None),
+    pending=(),
+    level=None,
+    emotion="joy",
+)
+
+
+def test_another_model_is_a_mismatch_another_runtime_is_told():
+    data = pack(Bond("m", "f", "t"), BODY, Memory({"x": np.arange(3.0)}))
+    opened = unpack(data, Bond("m", "g", "t"))
+    assert not opened.same_runtime
+    assert opened.memory.arrays["x"].tolist() == [0.0, 1.0, 2.0]
+    with pytest.raises(CheckpointMismatch, match="of another model file"):
+        unpack(data, Bond("n", "f", "t"))
+
+
+@given(st.binary(max_size=300))
+def test_no_bytes_raise_anything_else(data):
+    with pytest.raises(CheckpointUnknown):
+        unpack(data, Bond("m", "f", "t"))
