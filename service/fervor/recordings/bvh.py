@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from fervor.errors import InputError, RecordingError
 from fervor.recordings.recording import Recording
-from fervor.recordings.source import read_content
+from fervor.recordings.source import Content, read_content
 from fervor.rotations import from_euler, identity
 from fervor.skeletons.recognise import recognise
 
@@ -98,7 +98,11 @@ def read_bvh(
     Raises:
         RecordingError: the file can't be used; the sentence says where and why.
     """
-    content = read_content(source, name)
+    return parse_bvh(read_content(source, name), segments=segments)
+
+
+def parse_bvh(content: Content, *, segments: Mapping[str, str | None] | None = None) -> Recording:
+    """`read_bvh` for a content that has been read already."""
     words = _Words(content.label, content.text.splitlines())
     if not content.data.strip():
         words.fail("the file is empty")

@@ -1,0 +1,162 @@
+"""The adapter: a source's rotations become the rig's 13 local rotations (formula 3).
+
+For the rig joint between segments p and j with drives P and J: L = A_p · (Q_P^-1 · Q_J) · A_j^-1. With local rotations
+Q_P^-1 · Q_J is the product along the path from P to J in the source's tree, so that joints above both, and with them
+the sensor's place, never enter. A joint counts as untracked where the source says so or its quaternion is no rotation
+(shorter than 0.5, not finite: Kinect sends zeros for leaf joints); then every rig joint whose path passes it is
+unobserved and the identity. All arithmetic is elementwise: see `fervor.rotations`.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fervor.errors import InputError
+from fervor.rotations import IDENTITY, conjugate, identity, length, product
+from fervor.skeletons.rig import CHILD_SEGMENT, PARENT_SEGMENT
+from fervor.skeletons.skeleton import ROOT, Axes, Skeleton
+
+F = TypeVar("F", bound=np.floating[Any])
+
+SHORTEST = 0.5
+"""Least length of a quaternion that counts as one (formula 5)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """Which source joints make up each rig joint. Paths are padded with the index one past the last used joint."""
+
+    used: npt.NDArray[np.intp]  # [used] the source joints that matter
+    up: npt.NDArray[np.intp]  # [step, 13] used joints to multiply, from below the common ancestor to P; then inverted
+    down: npt.NDArray[np.intp]  # [step, 13] likewise to J
+    sees: npt.NDArray[np.bool_]  # [13]
+    aligned: bool  # all A are the identity
+    above: npt.NDArray[np.float64]  # [4, 13] A_p
+    below: npt.NDArray[np.float64]  # [4, 13] A_j^-1
+
+
+def adapt(
+    skeleton: Skeleton, rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_], *, axes: Axes
+) -> tuple[npt.NDArray[F], npt.NDArray[np.bool_]]:
+    """The rig's local rotations from a source's.
+
+    Args:
+        skeleton: the source.
+        rotations: [..., joint, 4] xyzw, in the skeleton's joint order; need not be of unit length.
+        observed: [..., joint], False where the source did not track a joint.
+        axes: whether the rotations are relative to the parent joint or to the sensor.
+
+    Returns:
+        Local unit rotations [..., 13, 4] of the caller's dtype, and whether each was observed [..., 13].
+
+    Raises:
+        InputError: another number of joints, or global rotations of a skeleton without a pelvis.
+    """
+    if rotations.shape[-2:] != (len(skeleton.joints), 4) or observed.shape != rotations.shape[:-1]:
+        raise InputError(
+            f"skeleton {skeleton.name!r} has {len(skeleton.joints)} joints of 4 numbers; "
+            f"got rotations {list(rotations.shape)} and a mask {list(observed.shape)}"
+        )
+    plan = _plan(skeleton, axes)
+    parts, tracked = _clean(rotations[..., plan.used, :], observed[..., plan.used])
+    turn, seen = _along(plan.down, parts, tracked)
+    if len(plan.up):
+        (x, y, z, w), seen_back = _along(plan.up, parts, tracked)
+        turn, seen = product((-x, -y, -z, w), turn), seen & seen_back
+    if not plan.aligned:
+        turn = product(product(plan.above.astype(parts.dtype), turn), plan.below.astype(parts.dtype))
+    seen = seen & plan.sees
+    local = identity(seen.shape, parts.dtype)
+    for index, part in enumerate(turn):
+        np.copyto(local[..., index], part, where=seen)
+    return local, seen
+
+
+def _clean(rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[F], npt.NDArray[np.bool_]]:
+    """Unit rotations as components [4, ..., joint + 1], and where they were tracked; the last joint is the identity.
+
+    Several products follow, and numpy is fastest where each component is an array of its own.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers too large to be rotations are untracked
+        size = length(rotations)
+        tracked = observed & (size >= SHORTEST) & np.isfinite(size)
+    parts = np.zeros((4, *tracked.shape[:-1], tracked.shape[-1] + 1), rotations.dtype)
+    parts[3] = 1.0
+    seen = np.ones(parts.shape[1:], np.bool_)
+    seen[..., :-1] = tracked
+    for index in range(4):
+        np.divide(rotations[..., index], size, out=parts[index, ..., :-1], where=tracked)
+    return parts, seen
+
+
+def check_axes(skeleton: Skeleton, axes: Axes) -> None:
+    """Whether rotations in these axes can be adapted at all.
+
+    Raises:
+        InputError: global rotations of a skeleton without a pelvis.
+    """
+    if axes == "global" and skeleton.needs_local:
+        raise InputError(f"skeleton {skeleton.name!r} has no pelvis joint; expected local rotations, not global ones")
+
+
+def _along(
+    path: npt.NDArray[np.intp], parts: npt.NDArray[F], tracked: npt.NDArray[np.bool_]
+) -> tuple[Iterable[Any], npt.NDArray[np.bool_]]:
+    """Products of rotations along paths [step, 13], as components, and whether all of a path was tracked."""
+    turn: Iterable[Any] = parts[..., path[0]]
+    seen = tracked[..., path[0]]
+    for step in path[1:]:
+        turn, seen = product(turn, parts[..., step]), seen & tracked[..., step]
+    return turn, seen
+
+
+@lru_cache(maxsize=64)
+def _plan(skeleton: Skeleton, axes: Axes) -> _Plan:
+    """Paths and binds of a skeleton, worked out once."""
+    check_axes(skeleton, axes)
+    ups: list[list[int]] = []
+    downs: list[list[int]] = []
+    for above, below, seen in zip(PARENT_SEGMENT, CHILD_SEGMENT, skeleton.sees, strict=True):
+        start, end = skeleton.drives[above], skeleton.drives[below]
+        if not seen or start is None or end is None:
+            up, down = [], []
+        elif axes == "global":
+            up, down = [start], [end]
+        else:
+            up, down = _path(skeleton.parents, start), _path(skeleton.parents, end)
+            shared = sum(1 for a, b in zip(up, down, strict=False) if a == b)
+            up, down = up[shared:], down[shared:]
+        ups.append(up)
+        downs.append(down)
+    used = sorted({joint for path in (*ups, *downs) for joint in path})
+    return _Plan(
+        used=np.array(used, np.intp),
+        up=_padded(ups, used),
+        down=_padded(downs, used) if any(downs) else np.full((1, len(downs)), len(used), np.intp),
+        sees=np.array(skeleton.sees),
+        aligned=bool((skeleton.bind == IDENTITY).all()),
+        above=np.ascontiguousarray(skeleton.bind[list(PARENT_SEGMENT)].T),
+        below=np.ascontiguousarray(conjugate(skeleton.bind[list(CHILD_SEGMENT)]).T),
+    )
+
+
+def _path(parents: tuple[int, ...], joint: int) -> list[int]:
+    """Joints from the root down to `joint`; none for `ROOT`."""
+    path: list[int] = []
+    while joint != ROOT:
+        path.append(joint)
+        joint = parents[joint]
+    return path[::-1]
+
+
+def _padded(paths: list[list[int]], used: list[int]) -> npt.NDArray[np.intp]:
+    """Paths of different lengths as one array [step, path] of places among the used joints."""
+    steps = max(len(path) for path in paths)
+    padded = np.full((steps, len(paths)), len(used), np.intp)
+    for column, path in enumerate(paths):
+        padded[: len(path), column] = [used.index(joint) for joint in path]
+    return padded

@@ -1,0 +1,61 @@
+"""CMU motion capture as BVH (the cgspeed conversion): zero pose T, axes left-up-forward."""
+
+from fervor.rotations import IDENTITY
+from fervor.skeletons.binds import T_POSE, bind_of
+from fervor.skeletons.skeleton import define
+
+CMU = define(
+    name="cmu",
+    title="CMU BVH, cgspeed conversion (31 nodes)",
+    tree={
+        "Hips": None,
+        "LHipJoint": "Hips",
+        "LeftUpLeg": "LHipJoint",
+        "LeftLeg": "LeftUpLeg",
+        "LeftFoot": "LeftLeg",
+        "LeftToeBase": "LeftFoot",
+        "RHipJoint": "Hips",
+        "RightUpLeg": "RHipJoint",
+        "RightLeg": "RightUpLeg",
+        "RightFoot": "RightLeg",
+        "RightToeBase": "RightFoot",
+        "LowerBack": "Hips",
+        "Spine": "LowerBack",
+        "Spine1": "Spine",
+        "Neck": "Spine1",
+        "Neck1": "Neck",
+        "Head": "Neck1",
+        "LeftShoulder": "Spine1",
+        "LeftArm": "LeftShoulder",
+        "LeftForeArm": "LeftArm",
+        "LeftHand": "LeftForeArm",
+        "LeftFingerBase": "LeftHand",
+        "LeftHandIndex1": "LeftFingerBase",
+        "LThumb": "LeftHand",
+        "RightShoulder": "Spine1",
+        "RightArm": "RightShoulder",
+        "RightForeArm": "RightArm",
+        "RightHand": "RightForeArm",
+        "RightFingerBase": "RightHand",
+        "RightHandIndex1": "RightFingerBase",
+        "RThumb": "RightHand",
+    },
+    drives={
+        "pelvis": "Hips",
+        "abdomen": "Spine",
+        "thorax": "Spine1",
+        "head": "Head",
+        "l_uparm": "LeftArm",
+        "l_forearm": "LeftForeArm",
+        "l_hand": "LeftHand",
+        "r_uparm": "RightArm",
+        "r_forearm": "RightForeArm",
+        "r_hand": "RightHand",
+        "l_thigh": "LeftUpLeg",
+        "l_shank": "LeftLeg",
+        "r_thigh": "RightUpLeg",
+        "r_shank": "RightLeg",
+    },
+    bind=bind_of(IDENTITY, T_POSE),
+)
+"""Its zero pose also spreads the legs by 20°: legs, as in every source, count from where the zero pose puts them."""

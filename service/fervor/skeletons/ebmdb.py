@@ -1,0 +1,50 @@
+"""EBMDB: BVH files of MVN Studio, 23 nodes, zero pose N, axes left-up-forward: nothing to align."""
+
+from fervor.skeletons.skeleton import define
+
+EBMDB = define(
+    name="ebmdb",
+    title="EBMDB, MVN Studio BVH (23 nodes)",
+    tree={
+        "Hips": None,
+        "Chest": "Hips",
+        "Chest2": "Chest",
+        "Chest3": "Chest2",
+        "Chest4": "Chest3",
+        "Neck": "Chest4",
+        "Head": "Neck",
+        "RightCollar": "Chest4",
+        "RightShoulder": "RightCollar",
+        "RightElbow": "RightShoulder",
+        "RightWrist": "RightElbow",
+        "LeftCollar": "Chest4",
+        "LeftShoulder": "LeftCollar",
+        "LeftElbow": "LeftShoulder",
+        "LeftWrist": "LeftElbow",
+        "RightHip": "Hips",
+        "RightKnee": "RightHip",
+        "RightAnkle": "RightKnee",
+        "RightToe": "RightAnkle",
+        "LeftHip": "Hips",
+        "LeftKnee": "LeftHip",
+        "LeftAnkle": "LeftKnee",
+        "LeftToe": "LeftAnkle",
+    },
+    drives={
+        "pelvis": "Hips",
+        "abdomen": "Chest2",
+        "thorax": "Chest4",
+        "head": "Head",
+        "l_uparm": "LeftShoulder",
+        "l_forearm": "LeftElbow",
+        "l_hand": "LeftWrist",
+        "r_uparm": "RightShoulder",
+        "r_forearm": "RightElbow",
+        "r_hand": "RightWrist",
+        "l_thigh": "LeftHip",
+        "l_shank": "LeftKnee",
+        "r_thigh": "RightHip",
+        "r_shank": "RightKnee",
+    },
+)
+"""A file with these names may still have a T-pose as its zero pose: `recognise` looks at its offsets."""
