@@ -1,0 +1,45 @@
+"""Python client of fervor: send body poses, get emotional intensities back while the person moves.
+
+    import asyncio
+    import fervor_client
+
+    async def main():
+        async with fervor_client.connect("ws://127.0.0.1:8080", emotion="joy") as session:
+            pose = [[0, 0, 0, 1]] * len(session.joints)  # a quaternion a joint: standing still
+            estimate = await session.estimate(pose)
+            print(f"{estimate.emotion}: {estimate.intensity:.2f}, {estimate.level}")
+
+    asyncio.run(main())
+
+`connect` and `Session` are for asyncio; `fervor_client.sync` has the same names for threads, without the `await`.
+"""
+
+from fervor.errors import AuthError, FervorError, FrameError, InputError, Overloaded, ProtocolError
+from fervor.levels import Level
+from fervor.protocol.messages import Estimate, SessionCalibrated, Totals
+from fervor.protocol.skeleton_spec import SkeletonSpec
+from fervor_client import sync
+from fervor_client.address import DEFAULT_URL
+from fervor_client.aio import Session, connect
+from fervor_client.failures import Unreachable
+from fervor_client.options import Options
+
+__all__ = [
+    "DEFAULT_URL",
+    "AuthError",
+    "Estimate",
+    "FervorError",
+    "FrameError",
+    "InputError",
+    "Level",
+    "Options",
+    "Overloaded",
+    "ProtocolError",
+    "Session",
+    "SessionCalibrated",
+    "SkeletonSpec",
+    "Totals",
+    "Unreachable",
+    "connect",
+    "sync",
+]
