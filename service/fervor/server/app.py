@@ -1,0 +1,47 @@
+"""The service as an ASGI application: routes, problems, description. Everything else has a file of its own."""
+
+from typing import Any
+
+from fastapi import Depends, FastAPI
+
+from fervor import __version__
+from fervor.server import health, model, score, skeletons, stream
+from fervor.server.auth import require_token
+from fervor.server.description import describe
+from fervor.server.lifespan import lifespan
+from fervor.server.problems import tell_problems
+from fervor.server.service import Service
+from fervor.settings import Settings
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The service, its model loaded and proven.
+
+    Args:
+        settings: as read at start; None reads them from the environment.
+
+    Raises:
+        SettingsError: a setting that can't be used.
+        ModelFileError: a model file whose contract the service can't meet.
+    """
+    service = Service.open(settings or Settings.load())
+    app = FastAPI(
+        title="fervor",
+        version=__version__,
+        summary="Live emotional intensity from body poses, for robots.",
+        license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
+        lifespan=lifespan,
+        redirect_slashes=False,
+    )
+    app.state.service = service
+    tell_problems(app)
+    for part in (stream, score, model, skeletons):
+        app.include_router(part.router, dependencies=[Depends(require_token)])
+    app.include_router(health.router)
+
+    def openapi() -> dict[str, Any]:
+        app.openapi_schema = app.openapi_schema or describe(app)
+        return app.openapi_schema
+
+    app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI documents it
+    return app

@@ -1,0 +1,25 @@
+"""Start and end of the service: proven before the first client comes, tidy after the last."""
+
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from fastapi import FastAPI
+
+from fervor.server.service import Service
+
+log = logging.getLogger(__name__)
+
+
+@asynccontextmanager
+async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+    """Run one step, so that no client waits for the first one; free the scoring process at the end."""
+    service = app.state.service
+    assert isinstance(service, Service)
+    await service.probe.run()
+    metadata = service.model.metadata
+    log.info("model %s %s (%s)", metadata.name, metadata.version, metadata.purpose)
+    try:
+        yield
+    finally:
+        await service.scoring.close()

@@ -1,0 +1,26 @@
+"""How many frames a second a session may send: an allowance that refills with time, one second's worth at most."""
+
+from fervor.errors import RateExceeded
+
+
+class Pace:
+    """The allowance of one session."""
+
+    def __init__(self, frames_per_second: float, burst: int) -> None:
+        """Start with a full allowance: a second's frames, or one whole message (`burst`) where that is more."""
+        self._rate = frames_per_second
+        self._most = max(frames_per_second, float(burst))
+        self._left = self._most
+        self._then = 0.0
+
+    def take(self, frames: int, now: float) -> None:
+        """Use up allowance for `frames` at `now` (seconds, any steady clock).
+
+        Raises:
+            RateExceeded: there is not that much.
+        """
+        self._left = min(self._most, self._left + (now - self._then) * self._rate)
+        self._then = now
+        if frames > self._left:
+            raise RateExceeded(f"more than {self._rate:g} frames a second came", retry_after=1.0)
+        self._left -= frames

@@ -1,0 +1,87 @@
+"""Runs the service under uvicorn, set up for live streams (measured: docs, "Performance").
+
+One process, one event loop (uvloop), no compression, no Nagle delay. SIGTERM and SIGINT stop it gently: no new
+connections, WebSockets are closed with 1012, and what is under way has `shutdown_grace_s` to end.
+"""
+
+import logging
+import socket
+from contextlib import ExitStack
+
+import uvicorn
+
+from fervor.errors import FervorError
+from fervor.server.app import create_app
+from fervor.settings import Settings
+
+log = logging.getLogger(__name__)
+
+STUCK_S = 20
+"""Seconds after which the kernel gives up a connection whose peer takes no bytes."""
+
+FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
+
+
+class AddressError(FervorError):
+    """The address to listen on can't be had."""
+
+    code = "address_in_use"
+    exit_code = 69
+
+
+class Server(uvicorn.Server):
+    """uvicorn, that says where it listens once it does."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start to listen."""
+        await super().startup(sockets)
+        for bound in sockets or []:
+            log.info("listening on http://%s:%d", *bound.getsockname()[:2])
+
+
+def run(settings: Settings) -> None:
+    """Run the service until it is told to stop.
+
+    Raises:
+        FervorError: the model or the address can't be used.
+    """
+    logging.basicConfig(level=settings.log_level.upper(), format=FORMAT)
+    with bind(settings.host, settings.port) as bound:
+        Server(configure(settings)).run(sockets=[bound])
+
+
+def configure(settings: Settings) -> uvicorn.Config:
+    """How uvicorn serves the application."""
+    return uvicorn.Config(
+        create_app(settings),
+        http="httptools",
+        ws="websockets-sansio",
+        ws_max_size=settings.max_message_bytes,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=settings.shutdown_grace_s,
+        log_config=None,
+        log_level=settings.log_level,
+        access_log=settings.log_level == "debug",
+        server_header=False,
+    )
+
+
+def bind(host: str, port: int) -> socket.socket:
+    """A socket bound to an address; what is set on it, its connections inherit. It listens once the service is ready.
+
+    Raises:
+        AddressError: the address can't be had.
+    """
+    with ExitStack() as undo:
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            bound = undo.enter_context(socket.socket(family, kind, protocol))
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            if hasattr(socket, "TCP_USER_TIMEOUT"):
+                bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, STUCK_S * 1000)
+            bound.bind(address)
+        except OSError as error:
+            raise AddressError(f"can't listen on {host} port {port}: {error.strerror or error}") from None
+        undo.pop_all()
+    return bound

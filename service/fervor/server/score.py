@@ -1,0 +1,83 @@
+"""`POST /v1/score` and `/v1/score/file`: whole recordings, with the estimates that a live stream would have got.
+
+The routes read no more than is allowed and hand the body on unread; see `scoring_process` for why.
+"""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.responses import Response
+
+from fervor.server.problems import problem_responses, too_large
+from fervor.server.scoring_models import MULTIPART, FileOptions, ScoreResponse
+from fervor.server.service import Service, service_of
+
+router = APIRouter(prefix="/v1", tags=["score"])
+
+PROBLEMS = problem_responses(401, 413, 422, 503)
+
+_FILE = {"type": "string", "format": "binary"}
+
+JSON_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/ScoreRequest"}}},
+    }
+}
+
+FILE_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            MULTIPART: {
+                "schema": {
+                    "type": "object",
+                    "properties": {
+                        "file": {"type": "array", "items": _FILE, "description": "one or more recordings"},
+                        "emotion": {"type": "string", "description": "options may come as fields too"},
+                    },
+                    "required": ["file"],
+                }
+            },
+            "application/octet-stream": {"schema": _FILE},
+        },
+    }
+}
+
+
+@router.post("/score", response_model=ScoreResponse, responses=PROBLEMS, openapi_extra=JSON_BODY)
+async def score(request: Request, service: Annotated[Service, Depends(service_of)]) -> Response:
+    """Score one or many sequences of frames: a summary of each or, with `detail: frames`, every estimate."""
+    body = await read_body(request, service.settings.score_max_bytes)
+    return _json(await service.scoring.run("score", body))
+
+
+@router.post("/score/file", response_model=ScoreResponse, responses=PROBLEMS, openapi_extra=FILE_BODY)
+async def score_file(
+    request: Request,
+    service: Annotated[Service, Depends(service_of)],
+    options: Annotated[FileOptions, Query()],
+) -> Response:
+    """Score motion files (BVH, MVNX, CSV, JSONL, NPZ).
+
+    They come as files of a form, or one as the body itself with its `filename` in the query.
+    """
+    body = await read_body(request, service.settings.score_max_bytes)
+    content_type = request.headers.get("content-type", "")
+    return _json(await service.scoring.run("score_files", body, content_type, options.model_dump(exclude_unset=True)))
+
+
+async def read_body(request: Request, limit: int) -> bytes:
+    """The body of a request, of at most `limit` bytes; a longer one is refused before it is read to its end."""
+    if int(request.headers.get("content-length", 0)) > limit:
+        raise too_large(limit)
+    body = bytearray()
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > limit:
+            raise too_large(limit)
+    return bytes(body)
+
+
+def _json(body: bytes) -> Response:
+    return Response(body, media_type="application/json")

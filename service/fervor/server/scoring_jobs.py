@@ -1,0 +1,167 @@
+"""What the scoring process does: a request body in, a response body out.
+
+Decoding and encoding belong to the work, so that not even a large body holds up the service's loop.
+"""
+
+import io
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import ValidationError
+from python_multipart import parse_form
+from python_multipart.exceptions import FormParserError
+from python_multipart.multipart import Field, File
+
+from fervor.errors import FrameError, RequestError, TooLarge
+from fervor.model import Model
+from fervor.protocol.codec import one_sentence
+from fervor.protocol.messages import Frame, SessionStart
+from fervor.recordings.reader import read_recording
+from fervor.recordings.recording import Recording
+from fervor.scoring import Scorer, Take
+from fervor.server.model_info import model_info
+from fervor.server.recordings import score_recording
+from fervor.server.scoring_models import (
+    MULTIPART,
+    FileOptions,
+    ScoreRequest,
+    ScoreResponse,
+    ScoreSequence,
+    SequenceScore,
+)
+from fervor.server.scoring_process import Allowed
+from fervor.session.start import Agreement, agree
+from fervor.skeletons.skeleton import Skeleton
+
+
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """One uploaded recording."""
+
+    filename: str
+    content: bytes
+
+
+class ScoringJobs:
+    """The two kinds of scoring request."""
+
+    def __init__(
+        self, model: Model, allowed: Allowed, skeletons: Mapping[str, Skeleton], *, row_multiple: int = 1
+    ) -> None:
+        """Prepare.
+
+        Args:
+            model: what to run.
+            allowed: limits of a request.
+            skeletons: those beside the catalogue's, by name.
+            row_multiple: see `fervor.engine.Engine`.
+        """
+        self._model = model
+        self._allowed = allowed
+        self._skeletons = skeletons
+        self._scorer = Scorer(model, row_multiple=row_multiple)
+
+    def score(self, body: bytes) -> bytes:
+        """Score the sequences of a JSON request.
+
+        Raises:
+            InputError: something in the request can't be used; says where.
+            TooLarge: more frames or sequences than allowed.
+        """
+        try:
+            request = ScoreRequest.model_validate_json(body, strict=True)
+        except ValidationError as error:
+            raise RequestError(one_sentence(error)) from None
+        self._check(len(request.sequences), sum(len(sequence.frames) for sequence in request.sequences))
+        terms_asked = SessionStart(**request.model_dump(exclude={"sequences", "detail"}))
+        agreement = agree(terms_asked, self._model.metadata, self._skeletons)
+        takes = [_take(number, sequence, agreement) for number, sequence in enumerate(request.sequences)]
+        terms = replace(agreement.terms, emotion_ttl_s=math.inf)
+        scored = self._scorer.score(takes, terms)
+        return self._answer(
+            SequenceScore.of(take.name, estimates, request.detail)
+            for take, estimates in zip(takes, scored, strict=True)
+        )
+
+    def score_files(self, body: bytes, content_type: str, query: Mapping[str, object]) -> bytes:
+        """Score uploaded recordings: a form with files, or a body that is a file.
+
+        Raises:
+            InputError: an option or a file can't be used; says which.
+            TooLarge: more frames or files than allowed.
+        """
+        fields, uploads = _read_form(body, content_type) if content_type.startswith(MULTIPART) else ({}, [])
+        try:
+            options = FileOptions.model_validate({**query, **fields})
+        except ValidationError as error:
+            raise RequestError(one_sentence(error)) from None
+        if not content_type.startswith(MULTIPART):
+            uploads = [Upload(options.filename or "", body)]
+        if not uploads:
+            raise RequestError("the form has no file; expected one or more recordings")
+        self._check(len(uploads), 0)
+        recordings = [_read_recording(upload, options.skeleton) for upload in uploads]
+        self._check(len(uploads), sum(map(len, recordings)))
+        metadata = self._model.metadata
+        return self._answer(score_recording(self._scorer, metadata, recording, options) for recording in recordings)
+
+    def _answer(self, scores: Iterable[SequenceScore]) -> bytes:
+        model = self._model
+        response = ScoreResponse(model=model_info(model), fingerprint=model.fingerprint, sequences=tuple(scores))
+        return response.model_dump_json().encode()
+
+    def _check(self, sequences: int, frames: int) -> None:
+        for count, most, what in (
+            (sequences, self._allowed.sequences, "sequences"),
+            (frames, self._allowed.frames, "frames"),
+        ):
+            if count > most:
+                raise TooLarge(f"the request has {count} {what}; this service takes at most {most} in one request")
+
+
+def _take(number: int, sequence: ScoreSequence, agreement: Agreement) -> Take:
+    """The frames of a sequence as arrays, through the gate that live frames pass."""
+    name = sequence.name or f"sequence {number}"
+    times, joints, observed = [], [], []
+    for seq, sent in enumerate(sequence.frames):
+        frame = Frame.model_construct(body=name, seq=seq, t=sent.t, q=sent.q, p=sent.p, mask=sent.mask)
+        try:
+            times.append(agreement.time_of(frame))
+            pose = agreement.pose_of(frame)
+        except FrameError as error:
+            raise RequestError(error.message) from None
+        joints.append(pose.joints)
+        observed.append(pose.observed)
+    return Take(name, np.array(times), np.stack(joints), np.stack(observed), sequence.emotion)
+
+
+def _read_recording(upload: Upload, skeleton: str | None) -> Recording:
+    stream = io.BytesIO(upload.content)
+    stream.name = upload.filename  # what readers call the file in their messages, and tell its kind by
+    return read_recording(stream, skeleton=skeleton)
+
+
+def _read_form(body: bytes, content_type: str) -> tuple[dict[str, str], list[Upload]]:
+    """The fields of a form, and its files."""
+    fields: dict[str, str] = {}
+    uploads: list[Upload] = []
+
+    def keep_field(field: Field) -> None:
+        fields[_text(field.field_name)] = _text(field.value)
+
+    def keep_file(file: File) -> None:
+        file.file_object.seek(0)
+        uploads.append(Upload(_text(file.file_name), file.file_object.read()))
+        file.close()
+
+    try:
+        parse_form({"Content-Type": content_type.encode()}, io.BytesIO(body), keep_field, keep_file)
+    except FormParserError as error:
+        raise RequestError(f"the form can't be read: {error}") from None
+    return fields, uploads
+
+
+def _text(raw: bytes | None) -> str:
+    return (raw or b"").decode("utf-8", errors="replace")

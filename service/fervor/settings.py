@@ -1,0 +1,121 @@
+"""The service's settings: read once at start from the environment and the command line, then handed down.
+
+Rules. A setting has a name, a default and a description here, and nowhere else: the options of `fervor serve` and the
+table in docs/reference/settings.md are made from this class. An option on the command line wins over the environment.
+Nothing below reads the environment. What a session may use is told to every client in `session.started`.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, SecretStr, ValidationError, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from fervor.errors import InputError
+from fervor.protocol.codec import one_sentence
+from fervor.protocol.messages import Limits
+
+ENV_PREFIX = "FERVOR_"
+"""`max_bodies` is FERVOR_MAX_BODIES in the environment."""
+
+MIB = 1_048_576
+
+LogLevel = Literal["critical", "error", "warning", "info", "debug"]
+
+
+class SettingsError(InputError):
+    """A setting that can't be used."""
+
+    code = "bad_settings"
+    exit_code = 78
+
+
+class Settings(BaseSettings):
+    """Everything that can be set. Sizes are bytes, times seconds, unless the name says otherwise."""
+
+    model_config = SettingsConfigDict(env_prefix=ENV_PREFIX, frozen=True, extra="forbid")
+
+    host: str = Field("127.0.0.1", description="address to listen on; 0.0.0.0 for all")
+    port: int = Field(8080, ge=0, le=65535, description="port to listen on; 0 takes a free one and says which")
+    log_level: LogLevel = Field("info", description="least severity that is logged")
+    tokens: Annotated[tuple[SecretStr, ...], NoDecode] = Field(
+        (), description="bearer tokens, separated by commas, of which a client must show one; empty: everybody may in"
+    )
+    model: Path | None = Field(None, description="model file (*.onnx); none: the demo model that comes with fervor")
+
+    skeletons: Path | None = Field(None, description="folder with calibrated skeletons (*.json), known by their names")
+
+    capacity: int = Field(1024, ge=1, le=65536, description="bodies the service follows at once, over all sessions")
+    max_sessions: int = Field(1024, ge=1, description="WebSocket sessions at once; one more is told to come later")
+    max_bodies: int = Field(16, ge=1, description="bodies in one session at once")
+    max_message_bytes: int = Field(MIB, ge=1024, description="size of one WebSocket message")
+    max_frames_per_message: int = Field(1024, ge=1, description="frames in one `frames` message")
+    max_frames_per_second: float = Field(2000.0, gt=0, description="frames a second from one session, over all bodies")
+    max_unsent_bytes: int = Field(
+        4 * MIB, ge=1024, description="answers that may wait for a slow reader before its session is closed"
+    )
+    max_unanswered_frames: int = Field(
+        4096, ge=1, description="frames of one session under way, above which the service reads no further for a while"
+    )
+    start_timeout_s: float = Field(10.0, gt=0, description="time a new connection has to send `session.start`")
+    idle_timeout_s: float = Field(60.0, gt=0, description="silence after which a session is closed")
+    body_idle_s: float = Field(10.0, gt=0, description="client time without a frame after which a body is forgotten")
+
+    score_max_bytes: int = Field(16 * MIB, ge=1024, description="size of a request to /v1/score and /v1/score/file")
+    score_max_frames: int = Field(100_000, ge=1, description="frames in one scoring request, over all sequences")
+    score_max_sequences: int = Field(256, ge=1, description="sequences in one scoring request")
+    score_queue: int = Field(8, ge=1, description="scoring requests under way; one more is told to come later")
+
+    shutdown_grace_s: int = Field(10, ge=0, description="time that open connections have to end when the service stops")
+
+    @field_validator("tokens", mode="before")
+    @classmethod
+    def _split(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            return tuple(token.strip() for token in value.split(",") if token.strip())
+        return value
+
+    @classmethod
+    def load(cls, **options: Any) -> Self:
+        """The settings from `options` (those that are not None), then the environment, then the defaults.
+
+        Raises:
+            SettingsError: one that can't be used; says which, what was expected and what came.
+        """
+        try:
+            return cls(**{name: value for name, value in options.items() if value is not None})
+        except ValidationError as error:
+            raise SettingsError(f"setting {one_sentence(error)}") from None
+
+    @property
+    def limits(self) -> Limits:
+        """What one session may use, as told in `session.started`."""
+        return Limits(**{name: getattr(self, name) for name in Limits.model_fields})
+
+
+def reference() -> str:
+    """All settings as a Markdown table, for docs/reference/settings.md."""
+    rows = ["| environment | option | default | what it is |", "|---|---|---|---|"]
+    for name, field in Settings.model_fields.items():
+        option = f"`{option_name(name)}`" if is_option(name) else "-"
+        rows.append(f"| `{ENV_PREFIX}{name.upper()}` | {option} | {_shown(field.default)} | {field.description} |")
+    return "\n".join(rows) + "\n"
+
+
+def option_name(name: str) -> str:
+    """The option of `fervor serve` that sets `name`."""
+    return "--" + name.replace("_", "-")
+
+
+def is_option(name: str) -> bool:
+    """Whether `name` can be set on the command line; secrets can't, for everybody on a machine sees command lines."""
+    return "SecretStr" not in str(Settings.model_fields[name].annotation)
+
+
+def _shown(default: Any) -> str:
+    return f"`{default}`" if default not in (None, ()) else "-"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(reference())

@@ -1,0 +1,44 @@
+"""What tests share: real motion, and a real service."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import httpx
+import pytest
+
+from live import Live, running
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder with real motion files; tests that need it are skipped where it is absent, except in CI."""
+    if not SHARED_DATA.is_dir():
+        if os.environ.get("CI"):
+            pytest.fail(f"{SHARED_DATA} is absent")
+        pytest.skip("the folder with real motion is absent")
+    return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def live() -> Iterator[Live]:
+    """A service with the default settings, one for all tests."""
+    with running(max_frames_per_second=1e6) as service:
+        yield service
+
+
+@pytest.fixture
+def start_service() -> Iterator[Callable[..., Live]]:
+    """Starts services with settings of their own: `start_service(max_bodies=1)`."""
+    with ExitStack() as stack:
+        yield lambda **settings: stack.enter_context(running(**settings))
+
+
+@pytest.fixture
+def http(live: Live) -> Iterator[httpx.Client]:
+    """HTTP to the service with the default settings."""
+    with httpx.Client(base_url=live.url, timeout=60) as client:
+        yield client
