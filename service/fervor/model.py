@@ -296,7 +296,7 @@ def check_row_independence(model: Model, *, rows: int = 70, frames: int = 5, lar
     data = _random_frames(max(rows, largest), frames, seed=1)
     sizes = (*range(2, 10), 12, 13, 16, 17, 31, 32, 33, 48, 63, 64, 65, rows, largest)
     for multiple in BATCH_MULTIPLES:
-        tried = [size for size in sizes if size % multiple == 0 and size > multiple]
+        tried = [size for size in sizes if size % multiple == 0 and multiple < size <= len(data.mask)]
         if _rows_agree(model, data, multiple, tried):
             return multiple
     raise EngineError(

@@ -1,0 +1,1 @@
+"""The training side of fervor: data, network, training, evaluation, export to ONNX."""

@@ -1,0 +1,111 @@
+"""`fervor train` and `fervor export`: entry points of the group `fervor.commands`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from fervor_export.clip import Clip
+    from fervor_export.recipe import Recipe
+    from fervor_export.training import TrainingResult
+
+CAST_CLIPS = 1000
+"""Synthetic clips of one cast of actors; more clips have more casts, and the finished network is scored on another."""
+
+
+def train(  # noqa: PLR0917  # typer calls it by name
+    data: Annotated[Literal["synthetic"], typer.Option(help="What to learn from.")] = "synthetic",
+    recipe: Annotated[Literal["default", "paper"], typer.Option(help="How to learn.")] = "default",
+    seed: Annotated[int, typer.Option(help="Of data, weights, order and augmentation.")] = 0,
+    clips: Annotated[int, typer.Option(min=20, help="How many clips to synthesise.")] = 10000,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Instead of the recipe's.")] = None,
+    minutes: Annotated[float | None, typer.Option(min=0, help="Stop after the epoch that reaches this.")] = None,
+    threads: Annotated[int, typer.Option(min=1, help="Of torch; results repeat for the same number.")] = 2,
+    out: Annotated[Path | None, typer.Option(help="Run directory.", show_default="runs/<data>-<recipe>-<seed>")] = None,
+) -> None:
+    """Train a network; leaves checkpoint, model file, model card and figures in a run directory."""
+    from dataclasses import replace
+
+    import torch
+
+    from fervor_export.recipe import RECIPES
+    from fervor_export.run import Run
+    from fervor_export.training import split_by_actor
+
+    torch.set_num_threads(threads)
+    chosen = RECIPES[recipe] if epochs is None else replace(RECIPES[recipe], epochs=epochs)
+    everything, test = _synthetic(clips, seed)
+    learn, validate = split_by_actor(everything, seed=seed)
+    result = _train_visibly(learn, validate, chosen, seed=seed, minutes=minutes)
+    run = Run(data=data, recipe=chosen, seed=seed, threads=threads, clips=everything, test=test, result=result)
+    directory = out or Path("runs") / f"{data}-{recipe}-{seed}"
+    trained = run.write(directory)
+    best, scores = result.best, trained.scores
+    typer.echo(
+        f"{directory}: epoch {best.number} of {len(result.history)}; on other actors MAE {scores['test_mae']:.3f}, "
+        f"r {scores['test_r']:.2f}, within emotion {scores['test_r_within']:.2f}"
+    )
+
+
+def export(
+    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a run.")],
+    out: Annotated[Path, typer.Option(help="Model file to write.")] = Path("model.onnx"),
+    name: Annotated[str, typer.Option(help="What the service will call it.")] = "fervor-demo",
+    version: Annotated[str, typer.Option(help="Of the model, as you count.")] = "0.1.0",
+    purpose: Annotated[
+        Literal["demo", "research"] | None,
+        typer.Option(help="Shown wherever the model shows.", show_default="the checkpoint's"),
+    ] = None,
+) -> None:
+    """Write the model file of a checkpoint, checked against the network it comes from."""
+    from fervor_export.checkpoint import load_checkpoint
+    from fervor_export.export import describe, export_model
+
+    trained = load_checkpoint(checkpoint)
+    metadata = describe(trained, name=name, version=version, purpose=purpose or trained.purpose)
+    report = export_model(trained.network, metadata, out)
+    typer.echo(f"{out}: {name} {version}, largest difference to the network {report.largest:.1e} ({report.where})")
+
+
+def _synthetic(clips: int, seed: int) -> "tuple[list[Clip], list[Clip]]":
+    """Clips to train and validate on, and clips of another cast for the test."""
+    from fervor_export.synthetic import synthesise_dataset
+
+    casts = -(-clips // CAST_CLIPS)
+    seeds = range(seed * 1000, seed * 1000 + casts + 1)  # runs with other seeds have other casts
+    sizes = [CAST_CLIPS] * (casts - 1) + [clips - CAST_CLIPS * (casts - 1), min(clips, CAST_CLIPS)]
+    *parts, test = (synthesise_dataset(clips=size, seed=cast) for cast, size in zip(seeds, sizes, strict=True))
+    return [clip for part in parts for clip in part], test
+
+
+def _train_visibly(
+    learn: "list[Clip]", validate: "list[Clip]", recipe: "Recipe", *, seed: int, minutes: float | None
+) -> "TrainingResult":
+    """Train with a progress bar and a line per epoch."""
+    from rich.progress import Progress
+
+    from fervor_export.training import Epoch
+    from fervor_export.training import train as run_training
+
+    with Progress() as progress:
+        task = progress.add_task(f"{len(learn)} clips", total=recipe.epochs * len(learn))
+
+        def show(epoch: Epoch) -> None:
+            scores = epoch.validation
+            progress.console.print(
+                f"epoch {epoch.number:3}  train MAE {epoch.train_mae:.4f}  validation MAE {scores.mae:.4f}"
+                f"  r {scores.r:.3f}  within {scores.r_within:.3f}  CCC {scores.ccc:.3f}  {epoch.seconds:.0f} s",
+                highlight=False,
+                soft_wrap=True,
+            )
+
+        return run_training(
+            learn,
+            validate,
+            recipe,
+            seed=seed,
+            max_minutes=minutes,
+            on_epoch=show,
+            on_batch=lambda count: progress.advance(task, count),
+        )

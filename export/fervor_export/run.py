@@ -1,0 +1,103 @@
+"""A finished training run and the directory it leaves: config, metrics, checkpoint, model file, model card."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from fervor.metadata import TrainingData
+from fervor_export.checkpoint import TrainedNetwork, save_checkpoint
+from fervor_export.clip import Clip, digest
+from fervor_export.export import describe, export_model, library_versions
+from fervor_export.model_card import model_card
+from fervor_export.prediction import fit, predict
+from fervor_export.recipe import Recipe
+from fervor_export.training import TrainingResult
+
+DESCRIPTIONS = {"synthetic": "procedurally generated expressive motion, no recordings of people"}
+"""What a data source is, in the words of the model's metadata."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """Everything there is to say about a training run."""
+
+    data: str
+    recipe: Recipe
+    seed: int
+    threads: int
+    clips: Sequence[Clip]
+    """Training and validation clips."""
+    test: Sequence[Clip]
+    """Clips of actors that neither training nor the choice of the epoch has seen."""
+    result: TrainingResult
+
+    def write(self, directory: Path) -> TrainedNetwork:
+        """Write the directory; files of an earlier run in it are replaced.
+
+        Raises:
+            ModelFileError: the model file does not compute what the network does.
+        """
+        trained = self.trained()
+        metadata = describe(trained, name=f"fervor-{trained.purpose}", version="0.1.0", purpose=trained.purpose)
+        report = export_model(trained.network, metadata, directory / "model.onnx")
+        save_checkpoint(trained, directory / "checkpoint.pt")
+        _write_json(directory / "config.json", self._config())
+        metrics = {
+            "scores": trained.scores,
+            "best_epoch": self.result.best.number,
+            "stopped": self.result.stopped,
+            "levels": trained.levels.model_dump(),
+            "parity": asdict(report),
+            "history": [asdict(epoch) for epoch in self.result.history],
+        }
+        _write_json(directory / "metrics.json", metrics)
+        (directory / "model_card.md").write_text(model_card(metadata, command=self.command()), encoding="utf-8")
+        return trained
+
+    @property
+    def purpose(self) -> Literal["demo", "research"]:
+        """A model of generated motion is a demo."""
+        return "demo" if self.data == "synthetic" else "research"
+
+    def trained(self) -> TrainedNetwork:
+        """The network, scored on the test clips."""
+        network = self.result.network
+        test = fit(self.test, predict(network, self.test, self.recipe))
+        return TrainedNetwork(
+            network=network,
+            recipe=self.recipe.name,
+            seed=self.seed,
+            purpose=self.purpose,
+            levels=self.result.levels,
+            training=TrainingData(
+                description=DESCRIPTIONS[self.data],
+                sha256=digest(self.clips),
+                recordings=len({clip.name for clip in self.clips}),
+                hours=round(sum(clip.seconds for clip in self.clips) / 3600, 2),
+            ),
+            scores=test.as_dict("test_") | self.result.best.validation.as_dict("validation_"),
+        )
+
+    def command(self) -> str:
+        """What to type to train this network again."""
+        return (
+            f"fervor train --data {self.data} --recipe {self.recipe.name} --seed {self.seed} "
+            f"--clips {len(self.clips)} --epochs {self.recipe.epochs} --threads {self.threads}"
+        )
+
+    def _config(self) -> dict[str, Any]:
+        return {
+            "command": self.command(),
+            "data": self.data,
+            "recipe": asdict(self.recipe),
+            "seed": self.seed,
+            "threads": self.threads,
+            "clips": len(self.clips),
+            "libraries": library_versions(),
+        }
+
+
+def _write_json(path: Path, value: object) -> None:
+    path.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,0 +1,95 @@
+"""`fervor train` and `fervor export`, from start to a file that the service takes."""
+
+import json
+
+import pytest
+import torch
+import typer
+from typer.testing import CliRunner
+
+from fervor.errors import ModelFileError
+from fervor.model import Model, check_row_independence
+from fervor_export import commands
+from networks import DEFAULT
+
+
+def app() -> typer.Typer:
+    made = typer.Typer(pretty_exceptions_enable=False)
+    made.command()(commands.train)
+    made.command()(commands.export)
+    return made
+
+
+def invoke(*arguments: str):
+    threads = torch.get_num_threads()
+    result = CliRunner().invoke(app(), arguments, catch_exceptions=False)
+    assert torch.get_num_threads() == threads or arguments[0] == "train"
+    return result
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("runs") / "first"
+    options = {"--data": "synthetic", "--clips": "120", "--epochs": "1", "--threads": "1", "--seed": "4"}
+    result = invoke("train", *(word for option in options.items() for word in option), "--out", str(directory))
+    assert result.exit_code == 0
+    return directory, result.output
+
+
+def test_what_a_run_leaves(run):
+    directory, output = run
+    assert {path.name for path in directory.iterdir()} == {
+        "config.json", "metrics.json", "checkpoint.pt", "model.onnx", "model_card.md",
+    }  # fmt: skip
+    assert "epoch   1" in output
+    assert f"{directory}: epoch 1 of 1" in output.replace("\n", "")
+    config = json.loads((directory / "config.json").read_text())
+    assert (config["recipe"]["name"], config["seed"], config["clips"]) == ("default", 4, 120)
+    assert config["command"] == (
+        "fervor train --data synthetic --recipe default --seed 4 --clips 120 --epochs 1 --threads 1"
+    )
+    metrics = json.loads((directory / "metrics.json").read_text())
+    assert len(metrics["history"]) == 1
+    assert metrics["parity"]["largest"] < 1e-5
+    assert metrics["scores"]["test_mae"] < 0.5
+
+
+def test_the_model_file_is_a_demo_that_the_service_takes(run):
+    model = Model.load(run[0] / "model.onnx")
+    assert (model.metadata.name, model.metadata.purpose) == ("fervor-demo", "demo")
+    assert model.metadata.states == DEFAULT.states
+    assert model.metadata.training.recordings == 120
+    assert 0 < model.metadata.training.hours < 1
+    assert check_row_independence(model, rows=9, largest=16) == 1
+
+
+def test_the_card_says_what_it_is(run):
+    card = (run[0] / "model_card.md").read_text()
+    for told in (
+        "demo",
+        "not science",
+        "share of\nobservers expected to recognise",
+        "fervor train --data synthetic",
+        "| surprise |",
+    ):
+        assert told in card
+
+
+def test_export_of_a_checkpoint(run, tmp_path):
+    out = tmp_path / "mine.onnx"
+    result = invoke("export", str(run[0] / "checkpoint.pt"), "--out", str(out), "--name", "mine", "--version", "3")
+    assert result.exit_code == 0
+    assert "mine 3, largest difference to the network" in result.output
+    mine, first = Model.load(out), Model.load(run[0] / "model.onnx")
+    assert (mine.metadata.name, mine.metadata.version, mine.metadata.purpose) == ("mine", "3", "demo")
+    assert mine.metadata.training == first.metadata.training
+
+
+def test_errors_are_ours_to_tell(tmp_path):
+    with pytest.raises(ModelFileError, match="is not a checkpoint of fervor"):
+        invoke("export", str(tmp_path / "absent.pt"))
+
+
+def test_unknown_choices_are_refused():
+    for arguments in (("train", "--recipe", "mine"), ("train", "--data", "ebmdb9"), ("train", "--clips", "1")):
+        assert invoke(*arguments).exit_code == 2
