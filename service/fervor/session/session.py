@@ -4,9 +4,12 @@ The caller's duties: hand every message to `receive` (or, if it could not be dec
 every `Ticket` to the engine in order and hand each outcome to `conclude`; call `lost` once when the connection is gone.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
+from fervor.emotions import emotion_vector
 from fervor.errors import CheckpointUnknown, CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import (
@@ -36,9 +39,9 @@ from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
 from fervor.session.calibrating import Calibrating
 from fervor.session.checkpoint import Bond, pack, unpack
-from fervor.session.events import Close, Event, Outcome, Pose, Release, Reply, Restore, Ticket
+from fervor.session.events import Close, Event, Outcome, Pose, Reply, Restore, Ticket
 from fervor.session.groups import Groups
-from fervor.session.label import NO_LABEL, make_label
+from fervor.session.roster import Roster
 from fervor.session.start import Agreement, agree
 from fervor.session.state import SessionState, transition
 from fervor.skeletons.skeleton import Skeleton
@@ -70,9 +73,7 @@ class Session:
         self.state = SessionState.NEW
         self._host = host
         self._agreement: Agreement | None = None
-        self._bodies: dict[str, Body] = {}
-        self._spare: list[int] = []
-        """Slots of forgotten bodies, for the next new one."""
+        self._roster = Roster(host.claim, most=host.limits.max_bodies, idle_s=host.limits.body_idle_s)
         self._tickets: dict[Ticket, tuple[Body, int]] = {}  # under way → its body, its place in the group
         self._groups = Groups()
         self._calibrating: Calibrating | None = None
@@ -135,11 +136,11 @@ class Session:
             case Frames():
                 return self._frames(message)
             case BodyReset():
-                self._body(message.body).reset()
+                self._roster.known(message.body).reset()
                 self._count("resets")
                 return []
             case BodyEnd():
-                return self._end_body(self._body(message.body))
+                return [self._roster.end(message.body)]
             case SessionCalibrate():
                 self._calibrating = Calibrating.begin(message, self._agreed.terms.source)
                 return []
@@ -153,6 +154,8 @@ class Session:
             self._agreement = agree(message, self._host.metadata, self._host.skeletons)
         except InputError as error:
             raise ProtocolError(error.message) from None
+        if message.clock == "frames":
+            self._roster = Roster(self._host.claim, most=self._host.limits.max_bodies, idle_s=math.inf)
         resumed, restores = self._resume(message.resume)
         started = SessionStarted(
             session_id=self.session_id,
@@ -179,8 +182,7 @@ class Session:
         resumed: list[Resumed] = []
         restores: list[Event] = []
         for kept in opened:
-            body = Body.restore(kept.body, self._host.claim(), self._agreed.terms)
-            self._bodies[body.name] = body
+            body = self._roster.restore(partial(Body.restore, kept.body, terms=self._agreed.terms))
             restores.append(Restore(body.slot, kept.memory))
             resumed.append(Resumed(body=body.name, seq=body.newest_seq, same_runtime=kept.same_runtime))
         return tuple(resumed), restores
@@ -190,7 +192,7 @@ class Session:
         if self.state is not SessionState.OPEN or self._agreed.terms.checkpoint_s is None:
             return []
         tickets: list[Event] = []
-        for body in self._bodies.values():
+        for body in self._roster:
             if body.last is not None:
                 ticket = body.snapshot(body.last)
                 self._tickets[ticket] = (body, -1)
@@ -219,23 +221,22 @@ class Session:
         except FervorError as error:
             self._count("rejected")
             events = [Reply(_error(error, frame))]
-        spare, self._spare = self._spare, []
-        return [*map(Release, spare), *events]
+        return [*self._roster.spare(), *events]
 
     def _plan(self, frame: Frame, group: int | None, place: int) -> list[Event]:
         agreement = self._agreed
         time = agreement.time_of(frame)
         pose = agreement.pose_of(frame)
-        body = self._bodies.get(frame.body)
-        if body is not None and (answer := body.answered(frame.seq)) is not None:
+        known = self._roster.find(frame.body)
+        if known is not None and (answer := known.answered(frame.seq)) is not None:
             self._count("duplicate")
             if group is None:
                 return [Reply(answer)]
             self._groups.put(group, place, answer)
             return []
-        if body is None or self._is_idle(body, time):
-            self._forget_idle(time)
-            body = self._open_body(frame.body, time, again=body is not None)
+        if frame.emotion is not None:
+            emotion_vector(frame.emotion)  # before a body is opened for it: a bad frame leaves no trace
+        body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
         ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group)
         self._tickets[ticket] = (body, place)
         if group is not None:
@@ -265,31 +266,6 @@ class Session:
             return []
         return [] if self._agreed.latest and body.in_flight else [Reply(estimate)]
 
-    def _open_body(self, name: str, time: float, *, again: bool) -> Body:
-        if len(self._bodies) >= self._host.limits.max_bodies:
-            raise InputError(
-                f"body {name!r} is one too many; this service takes {self._host.limits.max_bodies} a session"
-            )
-        agreement = self._agreed
-        ttl = agreement.terms.emotion_ttl_s
-        label = NO_LABEL if agreement.emotion is None else make_label(agreement.emotion, time, ttl)
-        slot = self._spare.pop() if self._spare else self._host.claim()
-        body = self._bodies[name] = Body(name, slot, agreement.terms, label)
-        if again:
-            body.reset("gap_reset")
-        return body
-
-    def _is_idle(self, body: Body, time: float) -> bool:
-        if self._agreed.terms.clock == "frames" or body.last is None:
-            return False
-        return time - body.last > self._host.limits.body_idle_s
-
-    def _forget_idle(self, time: float) -> None:
-        """Take the slots of bodies that sent nothing for longer than the idle time, by the client's clock."""
-        for body in [body for body in self._bodies.values() if self._is_idle(body, time)]:
-            del self._bodies[body.name]
-            self._spare.append(body.slot)
-
     def _calibrate(self, body: str, time: float, pose: Pose) -> list[Event]:
         """Hand a frame to the calibration under way; adopt its result."""
         if self._calibrating is None or body != self._calibrating.request.body:
@@ -304,7 +280,7 @@ class Session:
             return []
         self._calibrating = None
         self._agreement = self._agreed.aligned(found.skeleton)
-        for known in self._bodies.values():
+        for known in self._roster:
             known.adopt(self._agreement.terms)
         spec = SkeletonSpec.of(found.skeleton, name=name)
         return [
@@ -312,16 +288,6 @@ class Session:
                 SessionCalibrated(skeleton=spec, frames=found.frames, spread_deg=found.spread_deg, unseen=found.unseen)
             )
         ]
-
-    def _end_body(self, body: Body) -> list[Event]:
-        del self._bodies[body.name]
-        return [Release(body.slot)]
-
-    def _body(self, name: str) -> Body:
-        body = self._bodies.get(name)
-        if body is None:
-            raise FrameError(f"body {name!r} is not known in this session; it has sent no frame yet", body=name)
-        return body
 
     def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
         body.in_flight -= 1
@@ -336,10 +302,8 @@ class Session:
         return [Close(code, reason), *self._release_all()]
 
     def _release_all(self) -> list[Event]:
-        released: list[Event] = [Release(body.slot) for body in self._bodies.values()]
-        self._bodies.clear()
         self._tickets.clear()
-        return released
+        return [*self._roster.clear()]
 
     def _note(self, ticket: Ticket) -> None:
         self._count("frames")

@@ -16,6 +16,7 @@ from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
 from fervor.session.checkpoint import digest
 from fervor.session.events import Pose, Source
+from fervor.session.label import NO_LABEL, Label, make_label
 from fervor.skeletons.adapter import check_axes
 from fervor.skeletons.catalog import source
 from fervor.skeletons.landmarks import Landmarks
@@ -37,6 +38,10 @@ class Agreement:
     """Seconds a frame stands for where it brings no time (clock `frames`)."""
     places: npt.NDArray[np.intp] | None
     """[joint sent] its place in the skeleton; None where all are sent in the skeleton's order."""
+
+    def first_label(self, time: float) -> Label:
+        """The label of a body that comes at `time` (seconds, client clock)."""
+        return NO_LABEL if self.emotion is None else make_label(self.emotion, time, self.terms.emotion_ttl_s)
 
     def time_of(self, frame: Frame) -> float:
         """The frame's time in seconds.
