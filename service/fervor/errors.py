@@ -17,6 +17,7 @@ exit code of the command line (sysexits.h).
     │           └── CheckpointUnknown · CheckpointMismatch
     ├── AuthError             no or a wrong token
     ├── Overloaded            not now; try again later
+    ├── Unreachable           no service answers, or it went away
     └── EngineError           our own fault
 """
 
@@ -188,6 +189,15 @@ class Overloaded(FervorError):
     http_status = 503
     close_code = CloseCode.OVERLOADED
     exit_code = 75
+
+
+class Unreachable(FervorError):
+    """No service answers at the address, or it went away."""
+
+    code = "unreachable"
+    http_status = 502
+    close_code = None
+    exit_code = 69
 
 
 class EngineError(FervorError):

@@ -2,7 +2,8 @@
 
 A client opens with `session.start`, then sends frames; the service answers every frame with one estimate. All times are
 seconds on the client's clock, all intensities lie in [0, 1] and mean the share of observers expected to recognise the
-emotion. Unknown fields are refused, so that a misspelt option is told and not ignored.
+emotion. Unknown fields are refused, so that a misspelt option is told and not ignored;
+in what the service says they are passed over.
 """
 
 from collections.abc import Mapping
@@ -47,6 +48,12 @@ Flag = Literal[
 
 class _Message(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
+
+
+class _Answer(_Message):
+    """What a service says: fields that a newer one adds are passed over, so that clients need not keep pace."""
+
+    model_config = ConfigDict(extra="ignore")
 
 
 # --- client → service -------------------------------------------------------------------------------------------------
@@ -151,7 +158,7 @@ ClientMessage = Annotated[
 # --- service → client -------------------------------------------------------------------------------------------------
 
 
-class ModelInfo(_Message):
+class ModelInfo(_Answer):
     """The model that will answer."""
 
     name: str
@@ -163,7 +170,7 @@ class ModelInfo(_Message):
     thresholds: Mapping[str, float]
 
 
-class Limits(_Message):
+class Limits(_Answer):
     """What the service takes from one session; more is refused with an error."""
 
     max_message_bytes: int = 1_048_576
@@ -175,7 +182,7 @@ class Limits(_Message):
     body_idle_s: float = 10.0
 
 
-class Resumed(_Message):
+class Resumed(_Answer):
     """A body that goes on from a checkpoint."""
 
     body: str
@@ -183,7 +190,7 @@ class Resumed(_Message):
     same_runtime: bool = Field(description="estimates will be equal to the bit; else to 1e-6")
 
 
-class SessionStarted(_Message):
+class SessionStarted(_Answer):
     """The answer to `session.start`."""
 
     type: Literal["session.started"] = "session.started"
@@ -196,7 +203,7 @@ class SessionStarted(_Message):
     resumed: tuple[Resumed, ...] = ()
 
 
-class Estimate(_Message):
+class Estimate(_Answer):
     """The answer to one frame."""
 
     type: Literal["estimate"] = "estimate"
@@ -213,14 +220,14 @@ class Estimate(_Message):
     by_emotion: Mapping[str, float] | None = None
 
 
-class Estimates(_Message):
+class Estimates(_Answer):
     """The answer to `frames`."""
 
     type: Literal["estimates"] = "estimates"
     estimates: tuple[Estimate, ...]
 
 
-class SessionCalibrated(_Message):
+class SessionCalibrated(_Answer):
     """The answer to `session.calibrate`: in force from the next frame on; `session.start` takes it again."""
 
     type: Literal["session.calibrated"] = "session.calibrated"
@@ -230,7 +237,7 @@ class SessionCalibrated(_Message):
     unseen: tuple[str, ...] = Field(description="segments that were never tracked; they keep their alignment")
 
 
-class Checkpoint(_Message):
+class Checkpoint(_Answer):
     """Everything needed to go on with a body after its frame `seq`, on any service with the same key."""
 
     type: Literal["checkpoint"] = "checkpoint"
@@ -239,21 +246,21 @@ class Checkpoint(_Message):
     token: str = Field(description="signed; keep it as it is")
 
 
-class GoingAway(_Message):
+class GoingAway(_Answer):
     """The service stops: last checkpoints follow, then it closes with 1012. Connect again and resume."""
 
     type: Literal["going_away"] = "going_away"
     seconds: float = Field(description="time until the service closes at the latest")
 
 
-class Pong(_Message):
+class Pong(_Answer):
     """The answer to `ping`."""
 
     type: Literal["pong"] = "pong"
     id: str | None = None
 
 
-class Error(_Message):
+class Error(_Answer):
     """A sentence on what went wrong; after a fatal one the service closes."""
 
     type: Literal["error"] = "error"
@@ -265,7 +272,7 @@ class Error(_Message):
     retry_after: float | None = None
 
 
-class Totals(_Message):
+class Totals(_Answer):
     """What a session came to."""
 
     frames: int = 0
@@ -276,7 +283,7 @@ class Totals(_Message):
     resets: int = 0
 
 
-class SessionEnded(_Message):
+class SessionEnded(_Answer):
     """The last message of a conversation."""
 
     type: Literal["session.ended"] = "session.ended"

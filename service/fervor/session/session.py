@@ -275,7 +275,7 @@ class Session:
             found = self._calibrating.add(time, pose)
         except InputError as error:
             self._calibrating = None
-            return [Reply(_error(error))]
+            return [Reply(_error(error).model_copy(update={"body": body}))]
         if found is None:
             return []
         self._calibrating = None
