@@ -2,13 +2,14 @@
 
 import contextlib
 
+import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fervor.errors import MessageError
-from fervor.protocol.codec import JsonCodec
-from fervor.protocol.messages import Estimate, Frame
+from fervor.protocol.codec import JsonCodec, MsgpackCodec
+from fervor.protocol.messages import Estimate, Frame, Raw
 
 CODEC = JsonCodec()
 
@@ -55,3 +56,42 @@ def test_nulls_that_mean_something_are_kept():
     estimate = Estimate(body="0", seq=1, t=0.0, intensity=None, level=None, emotion="joy", status="insufficient")
     assert '"intensity":null' in CODEC.encode(estimate)
     assert "null" in CODEC.encode(Frame(seq=1, t=0.0, q=(None,)))
+
+
+PACKED = MsgpackCodec()
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"", "the message is not MessagePack"),
+        (b"\xc1", "the message is not MessagePack"),
+        (msgpack.packb([]), "valid dictionary"),
+        (msgpack.packb({"type": "frame", "seq": 1, "t": 0.0, "q": "text"}), "frame.q: input should be a valid"),
+        (msgpack.packb({"type": "frame", "seq": 1, "t": 0.0, "q": [], "x": 1}), "frame.x is not a field"),
+        (b"\xdf" + b"\xff" * 4, "the message is not MessagePack"),
+    ],
+)
+def test_bad_msgpack_is_told(data, told):
+    with pytest.raises(MessageError) as caught:
+        PACKED.decode_client(data)
+    assert told in caught.value.message
+    assert "\n" not in caught.value.message
+
+
+def test_text_on_the_binary_subprotocol_is_told():
+    with pytest.raises(MessageError, match="takes binary messages, but 2 characters"):
+        PACKED.decode_client("{}")
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_raise_anything_else(data):
+    with contextlib.suppress(MessageError):
+        PACKED.decode_client(data)
+
+
+def test_raw_joints_round_trip():
+    frame = Frame(seq=1, t=0.0, q=Raw(b"1234" * 8))
+    assert PACKED.decode_client(PACKED.encode(frame)) == frame
+    with pytest.raises(MessageError, match="frame.q: input should be a valid"):
+        CODEC.decode_client('{"type":"frame","seq":1,"t":0,"q":"12341234"}')

@@ -37,7 +37,13 @@ frames = st.builds(
     mask=st.none() | st.lists(st.booleans(), max_size=4).map(tuple),
     emotion=st.none() | st.sampled_from(["joy", "fear"]) | st.dictionaries(st.sampled_from(["joy"]), st.floats(0, 1)),
 )
-estimates = st.builds(Estimate, t=st.floats(-1e9, 1e9), intensity=st.none() | st.floats(0, 1), by_emotion=st.none())
+estimates = st.builds(
+    Estimate,
+    seq=st.integers(0, 2**53),
+    t=st.floats(-1e9, 1e9),
+    intensity=st.none() | st.floats(0, 1),
+    by_emotion=st.none(),
+)
 
 
 @pytest.mark.parametrize("codec", CODECS.values(), ids=CODECS.keys())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fervor.errors import FrameError
-from fervor.protocol.messages import Frame
+from fervor.protocol.messages import Frame, Raw
 from fervor.protocol.poses import frame_points, frame_pose
 
 JOINTS = ("a", "b", "c")
@@ -62,7 +62,8 @@ def test_positions_of_landmark_sensors():
         (points((0, 0, 0)), "has 1 joints in p; expected 3"),
         (points(None, (0, float("nan"), 0), None), r"at joint 1 \(b\); expected three finite numbers"),
         (points(None, None, (0, 1e12, 0)), r"at joint 2 \(c\); expected three finite numbers"),
-        (frame(UNIT, UNIT, UNIT), "has no p; expected 3 joints"),
+        (frame(UNIT, UNIT, UNIT), "expected positions in p alone"),
+        (Frame(body="eve", seq=7, t=0.0), "has no p; expected 3 joints"),
         (points(None, None, None, q=(UNIT, UNIT, UNIT)), "expected positions in p alone"),
     ],
 )
@@ -72,7 +73,26 @@ def test_poisoned_positions(bad, told):
 
 
 def test_positions_for_a_skeleton_of_rotations_are_told():
-    with pytest.raises(FrameError, match="has no q"):
-        frame_pose(points(None, None, None), JOINTS, "xyzw")
+    with pytest.raises(FrameError, match="has no q; expected 3 joints"):
+        frame_pose(Frame(seq=7, t=0.0), JOINTS, "xyzw")
     with pytest.raises(FrameError, match="expected quaternions in q alone"):
         frame_pose(points(None, None, None, q=(UNIT, UNIT, UNIT)), JOINTS, "xyzw")
+
+
+def test_raw_joints_are_float32():
+    rotations = np.array([UNIT, (0.0, 0.0, 0.0, 0.0), UNIT], "<f4")
+    got, observed = frame_pose(Frame(seq=7, t=0.0, q=Raw(rotations.tobytes())), JOINTS, "xyzw")
+    assert np.array_equal(got, rotations)
+    assert observed.tolist() == [True, False, True]
+    spots = np.array([(1, 2, 3), (np.nan, 0, 0), (0, 0, 0)], "<f4")
+    got, observed = frame_points(Frame(seq=7, t=0.0, p=Raw(spots.tobytes())), JOINTS)
+    assert got.tolist() == [[1, 2, 3], [0, 0, 0], [0, 0, 0]]
+    assert observed.tolist() == [True, False, True]
+
+
+def test_poisoned_raw_joints():
+    with pytest.raises(FrameError, match="has 12 bytes in q; expected 48: 3 joints of 4 float32"):
+        frame_pose(Frame(body="eve", seq=7, t=0.0, q=Raw(b"x" * 12)), JOINTS, "xyzw")
+    nan = np.full((3, 4), np.nan, "<f4").tobytes()
+    with pytest.raises(FrameError, match=r"at joint 0 \(a\); expected four finite numbers"):
+        frame_pose(Frame(body="eve", seq=7, t=0.0, q=Raw(nan)), JOINTS, "xyzw")

@@ -31,7 +31,7 @@ def test_landmark_sensors_send_positions():
     assert pose.joints.shape == (17, 3)
     assert pose.joints[7].tolist() == [1.0, 2.0, 3.0]
     assert pose.observed.sum() == 1
-    with pytest.raises(FrameError, match="has no p; expected 2 joints"):
+    with pytest.raises(FrameError, match="expected positions in p alone"):
         agreement.pose_of(Frame(seq=0, t=0.0, q=(None, None)))
 
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
+import msgpack
 from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import MessageError
@@ -59,10 +60,43 @@ class JsonCodec:
             raise MessageError(one_sentence(error)) from None
 
 
+class MsgpackCodec:
+    """`fervor.v1.msgpack`: one MessagePack map a binary frame; the joints of frames may be raw float32."""
+
+    subprotocol = f"{PROTOCOL}.msgpack"
+
+    def decode_client(self, data: str | bytes) -> ClientMessage:
+        """A message from the client; raises MessageError saying which field is wrong and what was expected."""
+        return self._decode(_CLIENT, data)
+
+    def decode_server(self, data: str | bytes) -> ServerMessage:
+        """A message from the service; raises MessageError."""
+        return self._decode(_SERVER, data)
+
+    def encode(self, message: ClientMessage | ServerMessage) -> bytes:
+        """The message as MessagePack; fields that say nothing are left out."""
+        packed = msgpack.packb(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
+        assert isinstance(packed, bytes)
+        return packed
+
+    @staticmethod
+    def _decode(adapter: TypeAdapter[_Message], data: str | bytes) -> _Message:
+        if isinstance(data, str):
+            raise MessageError(
+                f"{MsgpackCodec.subprotocol} takes binary messages, but {len(data)} characters of text came"
+            )
+        try:
+            return adapter.validate_python(msgpack.unpackb(data, use_list=False))
+        except ValidationError as error:
+            raise MessageError(one_sentence(error)) from None
+        except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
+            raise MessageError(f"the message is not MessagePack: {error or type(error).__name__}") from None
+
+
 KEEP_NULLS = frozenset({"estimate", "estimates", "frame", "frames"})
 """Messages in which null means something: no intensity yet, a joint not tracked."""
 
-CODECS: Mapping[str, Codec] = {codec.subprotocol: codec for codec in (JsonCodec(),)}
+CODECS: Mapping[str, Codec] = {codec.subprotocol: codec for codec in (JsonCodec(), MsgpackCodec())}
 """All codecs by subprotocol."""
 
 

@@ -9,7 +9,7 @@ in what the service says they are passed over.
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, RootModel, StringConstraints, model_validator
 
 from fervor.levels import Level
 from fervor.protocol.skeleton_spec import SkeletonSpec
@@ -88,6 +88,19 @@ Quaternion = Annotated[tuple[float, float, float, float], Field(description="zer
 Vector = tuple[float, float, float]
 
 
+class Raw(RootModel[bytes]):
+    """Joints as little-endian float32, one after the other; MessagePack only. Untracked: zeros in q, NaN in p."""
+
+    model_config = ConfigDict(frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_bytes(cls, value: object) -> object:
+        if not isinstance(value, bytes):
+            raise ValueError("expected an array of joints")  # noqa: TRY004  # pydantic tells ValueErrors as complaints
+        return value
+
+
 class Frame(_Message):
     """One timestamped pose of one body."""
 
@@ -95,8 +108,10 @@ class Frame(_Message):
     body: BodyId = "0"
     seq: int = Field(ge=0, le=2**53, description="rises by one or more from frame to frame")
     t: float | None = Field(None, allow_inf_nan=False, description="seconds, client clock; needed by clock `time`")
-    q: tuple[Quaternion | None, ...] | None = Field(None, description="one quaternion a joint; null where untracked")
-    p: tuple[Vector | None, ...] | None = Field(
+    q: tuple[Quaternion | None, ...] | Raw | None = Field(
+        None, description="one quaternion a joint; null where untracked"
+    )
+    p: tuple[Vector | None, ...] | Raw | None = Field(
         None, description="landmark sensors, in place of q: one position a joint, right-handed, any unit"
     )
     mask: tuple[bool, ...] | None = Field(None, description="false where untracked")

@@ -5,16 +5,13 @@ an untracked joint (null, all zero, mask false) is not an error but unobserved.
 """
 
 from collections.abc import Sequence
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from fervor.errors import FrameError
-from fervor.protocol.messages import Frame, Quaternion
+from fervor.protocol.messages import Frame, Raw
 from fervor.skeletons.skeleton import QuaternionOrder
-
-T = TypeVar("T")
 
 FARTHEST = 1e9
 """A coordinate beyond this is no place in a room, whatever its unit."""
@@ -42,15 +39,14 @@ def frame_pose(
     Raises:
         FrameError: wrong number of joints or mask entries, a value that is not finite, a quaternion far from unit.
     """
-    sent = _joints_of(frame, frame.q, "q", joints)
     if frame.p is not None:
         raise _refuse(frame, "has positions in p; expected quaternions in q alone, as this skeleton has rotations")
-    rotations = np.array([q or (0.0, 0.0, 0.0, 0.0) for q in sent], np.float64)  # [joint, 4]
+    rotations = _joints_of(frame, frame.q, "q", joints, 4)
     with np.errstate(over="ignore"):
         lengths = np.sqrt(np.sum(rotations * rotations, axis=-1))  # [joint]
     wrong = ~(lengths <= NOT_UNIT_ABOVE)
     if wrong.any():
-        raise _refuse(frame, _bad_quaternion(sent, joints, int(wrong.argmax())))
+        raise _refuse(frame, _bad_quaternion(rotations, joints, int(wrong.argmax())))
     observed = lengths >= UNTRACKED_BELOW
     if frame.mask is not None:
         observed &= np.array(frame.mask)
@@ -70,32 +66,51 @@ def frame_points(frame: Frame, joints: Sequence[str]) -> tuple[npt.NDArray[np.fl
     Raises:
         FrameError: wrong number of points or mask entries, or a value that is not finite or beyond any room.
     """
-    sent = _joints_of(frame, frame.p, "p", joints)
     if frame.q is not None:
         raise _refuse(frame, "has quaternions in q; expected positions in p alone, as this is a landmark sensor")
-    positions = np.array([p or (0.0, 0.0, 0.0) for p in sent], np.float64)  # [joint, 3]
+    positions = _joints_of(frame, frame.p, "p", joints, 3)
+    untracked: npt.NDArray[np.bool_]
+    if isinstance(frame.p, Raw):
+        untracked = np.any(np.isnan(positions), axis=-1)
+    else:
+        untracked = np.array([at is None for at in frame.p or ()], np.bool_)
+    positions = np.where(untracked[:, None], 0.0, positions)
     wrong = ~(np.abs(positions).max(axis=-1) <= FARTHEST)
     if wrong.any():
         index = int(wrong.argmax())
         where = f"joint {index} ({joints[index]})"
-        raise _refuse(frame, f"has {list(sent[index] or ())} at {where}; expected three finite numbers")
-    observed = np.array([p is not None for p in sent], np.bool_)
-    return positions, observed if frame.mask is None else observed & np.array(frame.mask)
+        raise _refuse(frame, f"has {positions[index].tolist()} at {where}; expected three finite numbers")
+    return positions, ~untracked if frame.mask is None else ~untracked & np.array(frame.mask)
 
 
-def _joints_of(frame: Frame, sent: tuple[T, ...] | None, field: str, joints: Sequence[str]) -> tuple[T, ...]:
-    """What a frame sends of its joints, as many as agreed."""
+def _joints_of(
+    frame: Frame, sent: Sequence[Sequence[float] | None] | Raw | None, field: str, joints: Sequence[str], width: int
+) -> npt.NDArray[np.float64]:
+    """What a frame sends of its joints [joint, width], as many as agreed; zeros where null."""
     if sent is None:
         raise _refuse(frame, f"has no {field}; expected {len(joints)} joints in it")
-    if len(sent) != len(joints):
+    if isinstance(sent, Raw):
+        array = _from_raw(frame, sent.root, field, joints, width)
+    elif len(sent) != len(joints):
         raise _refuse(frame, f"has {len(sent)} joints in {field}; expected {len(joints)}")
+    else:
+        array = np.array([joint or (0.0,) * width for joint in sent], np.float64)
     if frame.mask is not None and len(frame.mask) != len(joints):
         raise _refuse(frame, f"has {len(frame.mask)} entries in mask; expected {len(joints)}")
-    return sent
+    return array
 
 
-def _bad_quaternion(sent: Sequence[Quaternion | None], joints: Sequence[str], index: int) -> str:
-    values = list(sent[index] or ())
+def _from_raw(frame: Frame, raw: bytes, field: str, joints: Sequence[str], width: int) -> npt.NDArray[np.float64]:
+    expected = 4 * width * len(joints)
+    if len(raw) != expected:
+        raise _refuse(
+            frame, f"has {len(raw)} bytes in {field}; expected {expected}: {len(joints)} joints of {width} float32"
+        )
+    return np.frombuffer(raw, "<f4").reshape(len(joints), width).astype(np.float64)
+
+
+def _bad_quaternion(rotations: npt.NDArray[np.float64], joints: Sequence[str], index: int) -> str:
+    values = rotations[index].tolist()
     where = f"joint {index} ({joints[index]})"
     if not np.isfinite(values).all():
         return f"has {values} at {where}; expected four finite numbers"
