@@ -93,5 +93,5 @@ def test_no_bytes_raise_anything_else(data):
 def test_raw_joints_round_trip():
     frame = Frame(seq=1, t=0.0, q=Raw(b"1234" * 8))
     assert PACKED.decode_client(PACKED.encode(frame)) == frame
-    with pytest.raises(MessageError, match="frame.q: input should be a valid"):
+    with pytest.raises(MessageError, match=r"frame\.q: input should be a valid"):
         CODEC.decode_client('{"type":"frame","seq":1,"t":0,"q":"12341234"}')
