@@ -7,6 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from bodies import motion
+from fervor.protocol.messages import ClientMessage
+from fervor.session.events import Event
+from fervor.session.session import Session
 from live import Live, RawClient, frames_of, talk
 
 HEALTHY = frames_of(motion(60, seed=5))
@@ -134,7 +137,13 @@ async def test_a_fault_of_ours_ends_one_session_only(
     async with talk(live) as sick, talk(live) as healthy:
         await sick.start()
         await healthy.start(emotion="joy")
-        monkeypatch.setattr("fervor.session.session.Session._end_body", lambda *_: 1 / 0)
+        good = Session.receive
+
+        def fails_on_an_end(self: Session, message: ClientMessage) -> list[Event]:
+            assert message.type != "body.end"
+            return good(self, message)
+
+        monkeypatch.setattr(Session, "receive", fails_on_an_end)
         await sick.follow(HEALTHY[:1])
         await sick.send("body.end", body="0")
         assert (await sick.hear())["message"] == "the service failed on this session; the fault is its own"

@@ -9,6 +9,8 @@ import pytest
 import websockets
 
 from bodies import motion
+from fervor.protocol.codec import CODECS
+from fervor.protocol.messages import Frame, SessionStart
 from fervor.recordings.bvh import read_bvh
 from fervor.recordings.recording import rig_poses
 from live import PROTOCOL, Live, RawClient, bare, eventually, frames_of, score, score_request, talk
@@ -145,6 +147,24 @@ async def _neighbour(live: Live, number: int, ready: asyncio.Semaphore, stop: as
                 break
 
 
+@pytest.mark.parametrize("subprotocol", sorted(CODECS))
+async def test_every_encoding_says_the_same(subprotocol: str, live: Live) -> None:
+    codec = CODECS[subprotocol]
+    start = SessionStart(emotion="joy")
+    frames = [Frame.model_validate(frame) for frame in FRAMES]
+    async with websockets.connect(live.stream, subprotocols=[subprotocol], compression=None) as connection:
+        for message in (start, *frames):
+            await connection.send(codec.encode(message))
+        heard = [codec.decode_server(await connection.recv()) for _ in (start, *frames)]
+    async with talk(live) as stream:
+        await stream.start(emotion="joy")
+        plain = await stream.follow(FRAMES)
+    assert [estimate.seq for estimate in heard[1:]] == [estimate["seq"] for estimate in plain]
+    assert [estimate.intensity for estimate in heard[1:]] == pytest.approx(
+        [estimate["intensity"] for estimate in plain], abs=1e-5
+    )
+
+
 # --- time and limits --------------------------------------------------------------------------------------------------
 
 
@@ -187,6 +207,17 @@ async def test_a_message_with_too_many_frames_ends_nothing(start_service) -> Non
         assert len(await stream.follow(FRAMES)) == len(FRAMES)
 
 
+async def test_a_client_far_ahead_is_held_back_and_loses_nothing(start_service) -> None:
+    service = start_service(max_unanswered_frames=3)
+    async with talk(service) as stream:
+        await stream.start(emotion="joy")
+        hurried = await stream.follow(FRAMES)
+    async with talk(service) as stream:
+        await stream.start(emotion="joy")
+        patient = [estimate for frame in FRAMES for estimate in await stream.follow([frame])]
+    assert hurried == patient
+
+
 async def test_a_message_too_large_closes_with_1009(start_service) -> None:
     async with talk(start_service(max_message_bytes=2000)) as stream:
         await stream.start()
@@ -217,6 +248,10 @@ async def test_a_full_engine_refuses_the_frame_and_keeps_the_session(start_servi
         await second.send("frame", **FRAMES[0])
         error = await second.hear()
         assert (error["code"], error["fatal"]) == ("overloaded", False)
+        with pytest.raises(websockets.InvalidStatus) as refused:
+            async with talk(service):
+                pass
+        assert b"all 1 bodies of this service are in use" in refused.value.response.body
         await first.send("body.end", body="0")
         await first.send("ping")
         await first.hear()

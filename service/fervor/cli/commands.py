@@ -18,7 +18,8 @@ GROUP = "fervor.commands"
 """Entry point group of commands from elsewhere."""
 
 OURS = tuple(
-    EntryPoint(name, f"fervor.cli.{name}:{name}", GROUP) for name in ("serve", "stream", "score", "inspect", "demo")
+    EntryPoint(name, f"fervor.cli.{name}:{name}", GROUP)
+    for name in ("serve", "stream", "score", "convert", "calibrate", "inspect", "demo")
 )
 
 OWN_PACKAGES = frozenset({"fervor", "fervor_client", "fervor_export"})

@@ -74,21 +74,23 @@ class Conversation:
             self._heard = self._loop.time()
             text = event.get("text")
             self._take(event["bytes"] if text is None else text)
-            if self._unanswered >= self._settings.max_unanswered_frames:
+            while self._unanswered >= self._settings.max_unanswered_frames:
                 self._room.clear()
                 await self._room.wait()
 
     def _take(self, data: str | bytes) -> None:
         try:
+            self._carry_out(self._understand(data))
+        except Exception as fault:  # noqa: BLE001  # a fault of ours ends this session with a word, and no other
+            self._give_up(fault)
+
+    def _understand(self, data: str | bytes) -> list[Event]:
+        try:
             message = self._codec.decode_client(data)
             self._pace.take(min(_frames_in(message), self._settings.max_frames_per_message), self._heard)
         except FervorError as error:
-            self._carry_out(self._session.refuse(error))
-            return
-        try:
-            self._carry_out(self._session.receive(message))
-        except Exception as fault:  # noqa: BLE001  # a fault of ours ends this session with a word, and no other
-            self._give_up(fault)
+            return self._session.refuse(error)
+        return self._session.receive(message)
 
     def _carry_out(self, events: Iterable[Event]) -> None:
         """Do what the session asks, in its order."""

@@ -36,7 +36,8 @@ class Server(uvicorn.Server):
         """Start to listen."""
         await super().startup(sockets)
         for bound in sockets or []:
-            log.info("listening on http://%s:%d", *bound.getsockname()[:2])
+            host, port, *_ = bound.getsockname()
+            log.info("listening on http://%s:%d", f"[{host}]" if ":" in host else host, port)
 
 
 def run(settings: Settings) -> None:

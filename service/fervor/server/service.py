@@ -1,5 +1,7 @@
 """Everything one process of the service holds, made once at start and handed to whoever needs it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from starlette.requests import HTTPConnection
@@ -23,25 +25,9 @@ COME_BACK_S = 1.0
 
 
 class Sessions:
-    """How many sessions are open, and whether one more may be."""
+    """How many WebSocket sessions are open."""
 
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self.open = 0
-
-    def admit(self) -> None:
-        """Count one more session.
-
-        Raises:
-            Overloaded: there are as many as the service takes.
-        """
-        if self.open >= self.most:
-            raise Overloaded(f"all {self.most} sessions that this service takes are open", retry_after=COME_BACK_S)
-        self.open += 1
-
-    def leave(self) -> None:
-        """A session ended."""
-        self.open -= 1
+    open = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +68,7 @@ class Service:
             model=model,
             batcher=batcher,
             host=host,
-            sessions=Sessions(settings.max_sessions),
+            sessions=Sessions(),
             probe=Probe(batcher),
             scoring=ScoringProcess(
                 Start(
@@ -95,6 +81,24 @@ class Service:
                 most_waiting=settings.score_queue,
             ),
         )
+
+    @contextmanager
+    def admitted(self) -> Iterator[None]:
+        """Room for one more session, while it lasts.
+
+        Raises:
+            Overloaded: there are as many sessions as the service takes, or it has no body left to follow.
+        """
+        slots = self.batcher.engine.slots
+        if self.sessions.open >= self.settings.max_sessions:
+            raise Overloaded(f"all {self.sessions.open} sessions of this service are open", retry_after=COME_BACK_S)
+        if slots.taken >= slots.capacity:
+            raise Overloaded(f"all {self.settings.capacity} bodies of this service are in use", retry_after=COME_BACK_S)
+        self.sessions.open += 1
+        try:
+            yield
+        finally:
+            self.sessions.open -= 1
 
 
 def service_of(connection: HTTPConnection) -> Service:

@@ -4,9 +4,10 @@ Refusals before the upgrade are HTTP problems: an unknown subprotocol, a wrong t
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, WebSocket
+from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
 from starlette.responses import Response
 
 from fervor.errors import ProtocolError
@@ -25,12 +26,9 @@ PATH = "/v1/stream"
 async def stream(websocket: WebSocket, service: Annotated[Service, Depends(service_of)]) -> None:
     """Follow bodies live."""
     codec, agreed = choose_codec(websocket.scope["subprotocols"])
-    service.sessions.admit()
-    try:
+    with service.admitted(), suppress(WebSocketDisconnect):
         await websocket.accept(agreed)
         await Conversation(websocket, service, codec).run()
-    finally:
-        service.sessions.leave()
 
 
 @router.get("/stream", status_code=426, response_class=Response, responses=problem_responses(401, 426))
