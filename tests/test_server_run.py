@@ -74,6 +74,7 @@ async def test_sigterm_closes_streams_with_1012_and_ends() -> None:
             await stream.send('{"type": "session.start"}')
             await stream.recv()
             process.send_signal(signal.SIGTERM)
+            assert json.loads(await stream.recv())["type"] == "going_away"
             with pytest.raises(websockets.ConnectionClosed) as closed:
                 await stream.recv()
             assert closed.value.rcvd.code == 1012

@@ -82,3 +82,12 @@ def test_every_setting_is_described() -> None:
 
 def test_every_setting_is_documented() -> None:
     assert reference() in DOCUMENTED.read_text(encoding="utf-8"), "python -m fervor.settings writes the table anew"
+
+
+def test_a_secret_that_cannot_be_used_is_not_told_back():
+    with pytest.raises(SettingsError) as caught:
+        Settings.load(checkpoint_keys="tooshort")
+    assert caught.value.message == (
+        "setting checkpoint_keys: a key has fewer than 16 characters; expected a long random one"
+    )
+    assert "tooshort" not in repr(Settings.load(checkpoint_keys="tooshort" * 4))

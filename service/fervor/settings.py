@@ -21,6 +21,9 @@ ENV_PREFIX = "FERVOR_"
 
 MIB = 1_048_576
 
+SHORTEST_KEY = 16
+"""Characters; shorter keys can be guessed."""
+
 LogLevel = Literal["critical", "error", "warning", "info", "debug"]
 
 
@@ -67,14 +70,29 @@ class Settings(BaseSettings):
     score_max_sequences: int = Field(256, ge=1, description="sequences in one scoring request")
     score_queue: int = Field(8, ge=1, description="scoring requests under way; one more is told to come later")
 
+    checkpoint_keys: Annotated[tuple[SecretStr, ...], NoDecode] = Field(
+        (),
+        description="keys that sign checkpoints, separated by commas, 16 characters or more each: the first signs, all "
+        "are believed; the same on all replicas. Empty: one is made up, and no stream survives a restart",
+    )
+    checkpoint_ttl_s: float = Field(300.0, gt=0, description="age above which a checkpoint is not taken back")
+
+    drain_s: float = Field(5.0, ge=0, description="time that streams have to take their last checkpoints at the end")
     shutdown_grace_s: int = Field(10, ge=0, description="time that open connections have to end when the service stops")
 
-    @field_validator("tokens", mode="before")
+    @field_validator("tokens", "checkpoint_keys", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         if isinstance(value, str):
-            return tuple(token.strip() for token in value.split(",") if token.strip())
+            return tuple(secret.strip() for secret in value.split(",") if secret.strip())
         return value
+
+    @field_validator("checkpoint_keys")
+    @classmethod
+    def _long_enough(cls, keys: tuple[SecretStr, ...]) -> tuple[SecretStr, ...]:
+        if any(len(key.get_secret_value()) < SHORTEST_KEY for key in keys):
+            raise ValueError(f"a key has fewer than {SHORTEST_KEY} characters; expected a long random one")
+        return keys
 
     @classmethod
     def load(cls, **options: Any) -> Self:
@@ -86,6 +104,10 @@ class Settings(BaseSettings):
         try:
             return cls(**{name: value for name, value in options.items() if value is not None})
         except ValidationError as error:
+            first = error.errors(include_input=False)[0]
+            name = str(first["loc"][0]) if first["loc"] else ""
+            if name in cls.model_fields and not is_option(name):  # a secret must not be told back
+                raise SettingsError(f"setting {name}: {first['msg'].removeprefix('Value error, ')}") from None
             raise SettingsError(f"setting {one_sentence(error)}") from None
 
     @property

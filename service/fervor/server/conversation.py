@@ -16,7 +16,7 @@ from starlette.websockets import WebSocket
 
 from fervor.errors import EngineError, FervorError, IdleTimeout, Overloaded, StartTimeout
 from fervor.protocol.codec import Codec
-from fervor.protocol.messages import ClientMessage, Frame, Frames
+from fervor.protocol.messages import ClientMessage, Frame, Frames, GoingAway
 from fervor.server.outbox import Outbox
 from fervor.server.pace import Pace
 from fervor.server.service import Service
@@ -38,6 +38,8 @@ class Conversation:
         self._codec = codec
         self._settings = service.settings
         self._batcher = service.batcher
+        self._drain = service.drain
+        self._leaving = False
         self._session = Session(secrets.token_hex(8), service.host)
         self._outbox = Outbox(websocket, most_bytes=service.settings.max_unsent_bytes)
         self._loop = asyncio.get_running_loop()
@@ -52,6 +54,7 @@ class Conversation:
     async def run(self) -> None:
         """Talk until either side closes, then free what the session held."""
         sender = asyncio.create_task(self._send_all())
+        self._drain.enter(self)
         try:
             async with self._patience:
                 await self._listen()
@@ -61,6 +64,7 @@ class Conversation:
             log.info("session %s: the client did not take its close", self._session.session_id)
         finally:
             self._watch.cancel()
+            self._drain.leave(self)
             self._carry_out(self._session.lost())
             sender.cancel()
             await asyncio.gather(sender, return_exceptions=True)
@@ -78,7 +82,21 @@ class Conversation:
                 self._room.clear()
                 await self._room.wait()
 
+    def go_away(self, seconds: float) -> None:
+        """The service stops: take no more frames, send the last checkpoints, and close with 1012 after them."""
+        self._leaving = True
+        if self._session.state is not SessionState.CLOSED:
+            self._outbox.put(self._codec.encode(GoingAway(seconds=seconds)))
+        self._carry_out(self._session.checkpoints())
+        self._leave_when_done()
+
+    def _leave_when_done(self) -> None:
+        if self._leaving and not self._session.busy:
+            self._carry_out(self._session.interrupt())
+
     def _take(self, data: str | bytes) -> None:
+        if self._leaving:
+            return  # what comes now is after the last checkpoint: the client sends it again where it resumes
         try:
             self._carry_out(self._understand(data))
         except Exception as fault:  # noqa: BLE001  # a fault of ours ends this session with a word, and no other
@@ -125,6 +143,7 @@ class Conversation:
         self._room.set()
         try:
             self._carry_out(self._session.conclude(ticket, outcome))
+            self._leave_when_done()
         except Exception as fault:  # noqa: BLE001  # as above
             self._give_up(fault)
 

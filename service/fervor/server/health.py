@@ -28,6 +28,8 @@ async def alive() -> Health:
 @router.get("/readyz", response_model=Health, responses=problem_responses(503))
 async def ready(service: Annotated[Service, Depends(service_of)]) -> Health | Response:
     """A step of the model was run just now and gave a finite intensity; send no clients here if this fails."""
+    if service.drain.started:
+        return problem(503, "this service is on its way out", "going_away", retry_after=1.0)
     try:
         await service.probe.run()
     except EngineError as error:

@@ -19,6 +19,8 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     await service.probe.run()
     metadata = service.model.metadata
     log.info("model %s %s (%s)", metadata.name, metadata.version, metadata.purpose)
+    if not service.settings.checkpoint_keys:
+        log.info("no FERVOR_CHECKPOINT_KEYS: streams survive a cut connection, but not a restart of this service")
     try:
         yield
     finally:

@@ -1,7 +1,7 @@
 """Runs the service under uvicorn, set up for live streams (measured: docs, "Performance").
 
-One process, one event loop (uvloop), no compression, no Nagle delay. SIGTERM and SIGINT stop it gently: no new
-connections, WebSockets are closed with 1012, and what is under way has `shutdown_grace_s` to end.
+One process, one event loop (uvloop), no compression, no Nagle delay. SIGTERM and SIGINT stop it gently: it is no
+longer ready, streams get their last checkpoints and 1012, and what else is under way has `shutdown_grace_s` to end.
 """
 
 import logging
@@ -12,6 +12,7 @@ import uvicorn
 
 from fervor.errors import FervorError
 from fervor.server.app import create_app
+from fervor.server.service import Service
 from fervor.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -38,6 +39,13 @@ class Server(uvicorn.Server):
         for bound in sockets or []:
             host, port, *_ = bound.getsockname()
             log.info("listening on http://%s:%d", f"[{host}]" if ":" in host else host, port)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Send the streams away with their last checkpoints, then stop."""
+        service: Service = self.config.app.state.service  # type: ignore[union-attr]  # create_app put it there
+        if not await service.drain.run(service.settings.drain_s):
+            log.warning("not every client took its last checkpoint within %g s", service.settings.drain_s)
+        await super().shutdown(sockets)
 
 
 def run(settings: Settings) -> None:

@@ -10,10 +10,12 @@ from fervor.engine.batcher import Batcher
 from fervor.engine.engine import Engine
 from fervor.errors import Overloaded
 from fervor.model import Model, check_row_independence, default_model_path
+from fervor.server.draining import Drain
 from fervor.server.kept_skeletons import load_skeletons
 from fervor.server.model_info import model_info
 from fervor.server.probe import Probe
 from fervor.server.scoring_process import Allowed, ScoringProcess, Start
+from fervor.server.sealing import seal_and_open
 from fervor.session.session import Host
 from fervor.settings import Settings
 
@@ -39,6 +41,7 @@ class Service:
     batcher: Batcher
     host: Host
     sessions: Sessions
+    drain: Drain
     probe: Probe
     scoring: ScoringProcess
 
@@ -55,12 +58,15 @@ class Service:
         multiple = check_row_independence(model)
         engine = Engine(model, capacity=settings.capacity + OWN_BODIES, row_multiple=multiple)
         batcher = Batcher(engine)
+        seal, unseal = seal_and_open(settings)
         host = Host(
             model=model_info(model),
             metadata=model.metadata,
             limits=settings.limits,
             fingerprint=model.fingerprint,
             claim=engine.claim,
+            seal=seal,
+            unseal=unseal,
             skeletons=load_skeletons(settings.skeletons),
         )
         return cls(
@@ -69,6 +75,7 @@ class Service:
             batcher=batcher,
             host=host,
             sessions=Sessions(),
+            drain=Drain(),
             probe=Probe(batcher),
             scoring=ScoringProcess(
                 Start(
@@ -87,9 +94,11 @@ class Service:
         """Room for one more session, while it lasts.
 
         Raises:
-            Overloaded: there are as many sessions as the service takes, or it has no body left to follow.
+            Overloaded: the service stops, has as many sessions as it takes, or no body left to follow.
         """
         slots = self.batcher.engine.slots
+        if self.drain.started:
+            raise Overloaded("this service is on its way out; connect again", retry_after=COME_BACK_S)
         if self.sessions.open >= self.settings.max_sessions:
             raise Overloaded(f"all {self.sessions.open} sessions of this service are open", retry_after=COME_BACK_S)
         if slots.taken >= slots.capacity:

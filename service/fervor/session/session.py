@@ -127,6 +127,12 @@ class Session:
         self.state = SessionState.CLOSED
         return self._release_all()
 
+    def interrupt(self) -> list[Event]:
+        """The service stops: close so that the client goes on elsewhere."""
+        if self.state is SessionState.CLOSED:
+            return []
+        return self._close(CloseCode.RESTART, "the service restarts; connect again and resume")
+
     def _dispatch(self, message: ClientMessage) -> list[Event]:
         match message:
             case SessionStart():
