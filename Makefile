@@ -15,7 +15,7 @@ help: ## what there is to say
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
 run: $(VENV)/serve.stamp ## start the service, stream a sample to it, show the live meter
-	@$(BIN)/fervor demo
+	@$(BIN)/fervor demo || [ $$? -eq 130 ]  # Ctrl-C is the way to stop it
 
 test: $(VENV)/dev.stamp ## run the tests
 	@$(BIN)/python -m pytest $(MARKS)
