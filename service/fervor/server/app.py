@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import Depends, FastAPI
 
 from fervor import __version__
-from fervor.server import health, model, score, skeletons, stream
+from fervor.server import asyncapi, health, model, score, skeletons, stream
 from fervor.server.auth import require_token
 from fervor.server.description import describe
 from fervor.server.lifespan import lifespan
@@ -38,6 +38,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for part in (stream, score, model, skeletons):
         app.include_router(part.router, dependencies=[Depends(require_token)])
     app.include_router(health.router)
+    app.include_router(asyncapi.router)
 
     def openapi() -> dict[str, Any]:
         app.openapi_schema = app.openapi_schema or describe(app)
