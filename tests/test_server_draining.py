@@ -11,6 +11,7 @@ import pytest
 import websockets
 
 from bodies import motion
+from fervor.protocol.messages import Totals
 from fervor.server.draining import Drain
 from live import PROTOCOL, Live, frames_of, talk
 from program import start_fervor
@@ -148,6 +149,8 @@ async def test_a_drain_does_not_wait_for_ever() -> None:
     drain = Drain()
 
     class Deaf:
+        totals = Totals()
+
         def go_away(self, seconds: float) -> None:
             pass
 

@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import Depends, FastAPI
 
 from fervor import __version__
-from fervor.server import asyncapi, health, model, score, skeletons, stream
+from fervor.server import asyncapi, health, model, score, scrape, skeletons, stream
 from fervor.server.auth import require_token
 from fervor.server.description import describe
 from fervor.server.lifespan import lifespan
@@ -39,6 +39,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(part.router, dependencies=[Depends(require_token)])
     app.include_router(health.router)
     app.include_router(asyncapi.router)
+    app.include_router(scrape.router)
 
     def openapi() -> dict[str, Any]:
         app.openapi_schema = app.openapi_schema or describe(app)

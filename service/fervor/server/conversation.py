@@ -16,7 +16,7 @@ from starlette.websockets import WebSocket
 
 from fervor.errors import EngineError, FervorError, IdleTimeout, Overloaded, StartTimeout
 from fervor.protocol.codec import Codec
-from fervor.protocol.messages import ClientMessage, Frame, Frames, GoingAway
+from fervor.protocol.messages import ClientMessage, Frame, Frames, GoingAway, Totals
 from fervor.server.outbox import Outbox
 from fervor.server.pace import Pace
 from fervor.server.service import Service
@@ -81,6 +81,11 @@ class Conversation:
             while self._unanswered >= self._settings.max_unanswered_frames:
                 self._room.clear()
                 await self._room.wait()
+
+    @property
+    def totals(self) -> Totals:
+        """What it came to so far."""
+        return self._session.totals
 
     def go_away(self, seconds: float) -> None:
         """The service stops: take no more frames, send the last checkpoints, and close with 1012 after them."""

@@ -4,11 +4,18 @@ Readiness is false from the first moment, so that a load balancer sends nobody n
 """
 
 import asyncio
+from collections.abc import Iterator
 from typing import Protocol
+
+from fervor.protocol.messages import Totals
 
 
 class Leaving(Protocol):
-    """A conversation that can be told to end."""
+    """A conversation that can be told to end, and asked what it came to."""
+
+    @property
+    def totals(self) -> Totals:
+        """So far."""
 
     def go_away(self, seconds: float) -> None:
         """Say so, send the last checkpoints, and close once they are out."""
@@ -19,26 +26,35 @@ class Drain:
 
     def __init__(self) -> None:
         self.started = False
-        self._talking: set[Leaving] = set()
+        self.begun = 0
+        self.talking: set[Leaving] = set()
+        self._ended = Totals()
         self._empty = asyncio.Event()
 
     def enter(self, conversation: Leaving) -> None:
         """A conversation began."""
-        self._talking.add(conversation)
+        self.begun += 1
+        self.talking.add(conversation)
 
     def leave(self, conversation: Leaving) -> None:
         """A conversation is over."""
-        self._talking.discard(conversation)
-        if not self._talking:
+        self.talking.discard(conversation)
+        self._ended = add(self._ended, conversation.totals)
+        if not self.talking:
             self._empty.set()
+
+    def all_totals(self) -> Iterator[Totals]:
+        """What all conversations came to, those that are over in one."""
+        yield self._ended
+        yield from (conversation.totals for conversation in self.talking)
 
     async def run(self, seconds: float) -> bool:
         """Send everybody away; whether all were gone within `seconds`."""
         self.started = True
-        if not self._talking:
+        if not self.talking:
             return True
         self._empty.clear()
-        for conversation in list(self._talking):
+        for conversation in list(self.talking):
             conversation.go_away(seconds)
         try:
             async with asyncio.timeout(seconds):
@@ -46,3 +62,8 @@ class Drain:
         except TimeoutError:
             return False
         return True
+
+
+def add(one: Totals, other: Totals) -> Totals:
+    """The sum of two."""
+    return Totals(**{name: getattr(one, name) + getattr(other, name) for name in Totals.model_fields})

@@ -1,5 +1,6 @@
 """Start and end of the service: proven before the first client comes, tidy after the last."""
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -21,7 +22,9 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     log.info("model %s %s (%s)", metadata.name, metadata.version, metadata.purpose)
     if not service.settings.checkpoint_keys:
         log.info("no FERVOR_CHECKPOINT_KEYS: streams survive a cut connection, but not a restart of this service")
+    lag = asyncio.create_task(service.metrics.watch_loop())
     try:
         yield
     finally:
+        lag.cancel()
         await service.scoring.close()

@@ -12,6 +12,7 @@ from fervor.errors import Overloaded
 from fervor.model import Model, check_row_independence, default_model_path
 from fervor.server.draining import Drain
 from fervor.server.kept_skeletons import load_skeletons
+from fervor.server.metrics import Metrics
 from fervor.server.model_info import model_info
 from fervor.server.probe import Probe
 from fervor.server.scoring_process import Allowed, ScoringProcess, Start
@@ -42,6 +43,7 @@ class Service:
     host: Host
     sessions: Sessions
     drain: Drain
+    metrics: Metrics
     probe: Probe
     scoring: ScoringProcess
 
@@ -58,6 +60,7 @@ class Service:
         multiple = check_row_independence(model)
         engine = Engine(model, capacity=settings.capacity + OWN_BODIES, row_multiple=multiple)
         batcher = Batcher(engine)
+        drain = Drain()
         seal, unseal = seal_and_open(settings)
         host = Host(
             model=model_info(model),
@@ -75,7 +78,8 @@ class Service:
             batcher=batcher,
             host=host,
             sessions=Sessions(),
-            drain=Drain(),
+            drain=drain,
+            metrics=Metrics(batcher, drain),
             probe=Probe(batcher),
             scoring=ScoringProcess(
                 Start(
@@ -98,16 +102,20 @@ class Service:
         """
         slots = self.batcher.engine.slots
         if self.drain.started:
-            raise Overloaded("this service is on its way out; connect again", retry_after=COME_BACK_S)
+            raise self._refusal("draining", "this service is on its way out; connect again")
         if self.sessions.open >= self.settings.max_sessions:
-            raise Overloaded(f"all {self.sessions.open} sessions of this service are open", retry_after=COME_BACK_S)
+            raise self._refusal("sessions", f"all {self.sessions.open} sessions of this service are open")
         if slots.taken >= slots.capacity:
-            raise Overloaded(f"all {self.settings.capacity} bodies of this service are in use", retry_after=COME_BACK_S)
+            raise self._refusal("bodies", f"all {self.settings.capacity} bodies of this service are in use")
         self.sessions.open += 1
         try:
             yield
         finally:
             self.sessions.open -= 1
+
+    def _refusal(self, reason: str, sentence: str) -> Overloaded:
+        self.metrics.note_refusal(reason)
+        return Overloaded(sentence, retry_after=COME_BACK_S)
 
 
 def service_of(connection: HTTPConnection) -> Service:
