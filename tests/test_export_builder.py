@@ -5,6 +5,7 @@ import onnxruntime
 import torch
 from onnx import TensorProto, helper
 
+import fervor.model  # noqa: F401  # first: it keeps onnxruntime from reporting to its maker
 from fervor_export.builder import GraphBuilder, atan2
 from fervor_export.graph import IR_VERSION, OPSET
 

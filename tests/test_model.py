@@ -1,6 +1,7 @@
 """The model file at run time: what is loaded, what is refused, and that nothing prints."""
 
 import hashlib
+import os
 import re
 import subprocess
 import sys
@@ -291,3 +292,11 @@ def test_states_that_differ_are_seen_too(model):
 
 def test_onnx_itself_finds_nothing_wrong():
     onnx.checker.check_model(onnx.load_from_string(model_bytes()), full_check=True)
+
+
+def test_onnxruntime_reports_to_nobody(tmp_path):
+    """Its telemetry, on by default since 1.29, leaves a device id in the home folder when it runs."""
+    code = "from fervor.model import Model, default_model_path; Model.load(default_model_path())"
+    environment = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache"), "PATH": os.environ["PATH"]}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    assert list(tmp_path.rglob("*")) == []

@@ -1,12 +1,12 @@
 """From a trained network to a model file, which is left on disk only if it computes what the network does."""
 
 import platform
+from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import onnx
-import onnxruntime
 import torch
 
 import fervor
@@ -81,7 +81,7 @@ def library_versions() -> dict[str, str]:
         "fervor": fervor.__version__,
         "numpy": np.__version__,
         "onnx": onnx.__version__,
-        "onnxruntime": onnxruntime.__version__,
+        "onnxruntime": version("onnxruntime"),
         "python": platform.python_version(),
         "torch": torch.__version__,
     }

@@ -8,6 +8,7 @@ differ between machines, the last bits of a row's result, is checked by `check_r
 """
 
 import hashlib
+import os
 import platform
 import re
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+# Since 1.29 onnxruntime reports to its maker what it runs, unless this is set before it is imported.
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"
+
 import onnxruntime
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 

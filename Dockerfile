@@ -1,0 +1,26 @@
+# The service alone: no torch, no compiler, no root. Build: docker build -t fervor .
+# PYTHON names the base image, so that a mirror or a newer patch release can be used.
+ARG PYTHON=python:3.11-slim
+
+FROM ${PYTHON} AS build
+WORKDIR /src
+RUN python -m venv /opt/fervor
+COPY constraints.txt .
+COPY pyproject.toml README.md LICENSE ./
+COPY service service
+COPY export export
+COPY clients/python clients/python
+RUN /opt/fervor/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt '.[serve]' \
+ && find /opt/fervor -depth \( -name __pycache__ -o -name tests -o -name test \) -type d -exec rm -rf {} + \
+ && rm -rf /opt/fervor/lib/python3*/site-packages/pip /opt/fervor/lib/python3*/site-packages/setuptools
+
+FROM ${PYTHON}
+COPY --from=build /opt/fervor /opt/fervor
+ENV PATH=/opt/fervor/bin:$PATH PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 ORT_DISABLE_TELEMETRY=1 FERVOR_HOST=0.0.0.0
+USER 65532:65532
+EXPOSE 8080
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=5s --timeout=3s --start-period=10s \
+  CMD ["python", "-c", "import urllib.request as r; r.urlopen('http://127.0.0.1:8080/readyz', timeout=2)"]
+ENTRYPOINT ["fervor"]
+CMD ["serve"]
