@@ -121,6 +121,15 @@ def test_duplicates_and_late_frames_are_answered_and_counted():
     assert (totals.duplicate, totals.late, totals.frames) == (1, 1, 11)
 
 
+def test_a_duplicate_of_a_frame_under_way_gets_that_frames_answer():
+    talk = Talk(start=SessionStart())
+    tickets = [event for seq in (0, 1, 0, 2) for event in talk.session.receive(frame(seq))]
+    said = [message for ticket in tickets for message in talk.carry([ticket])]
+    assert said[2] == said[0].model_copy(update={"flags": ("duplicate",)})
+    assert not said[3].flags
+    assert talk.session.totals.duplicate == 1
+
+
 def test_the_wrong_message_at_the_wrong_time_is_fatal():
     talk = Talk()
     (error,) = talk.say(frame(0))

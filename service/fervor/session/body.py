@@ -61,6 +61,7 @@ class Body:
         self._pending: tuple[Flag, ...] = ()
         self._next_checkpoint = -math.inf  # seconds
         self._answers: OrderedDict[int, Estimate] = OrderedDict()
+        self._under_way: set[int] = set()  # seqs planned and not concluded
         self._enough = _enough(terms)
 
     @property
@@ -112,6 +113,9 @@ class Body:
             flags, self._pending = (*self._pending, *flags), ()
         if lost:
             flags = (*flags, "lost")
+        if seq in self._under_way:
+            flags = ("duplicate",)
+        self._under_way.add(seq)
         self._timeline = moved.timeline
         self.in_flight += 1
         return Ticket(
@@ -120,7 +124,7 @@ class Body:
             seq=seq,
             time=time,
             source=self._terms.source,
-            pose=None if lost or "late" in flags else pose,
+            pose=None if lost or late or "late" in flags else pose,
             fresh=fresh or moved.fresh,
             steps=tuple(map(self._step, moved.instants)),
             flags=flags,
@@ -196,6 +200,9 @@ class Body:
     def conclude(self, ticket: Ticket, outcome: Outcome) -> Estimate:
         """The estimate for a ticket, in the order in which tickets were planned."""
         self.in_flight -= 1
+        self._under_way.discard(ticket.seq)
+        if "duplicate" in ticket.flags and (answer := self.answered(ticket.seq)):
+            return answer
         if ticket.fresh:
             self._level = None
         if ticket.steps:

@@ -314,6 +314,7 @@ class Session:
     def _note(self, ticket: Ticket) -> None:
         self._count("frames")
         self._totals["late"] += "late" in ticket.flags
+        self._totals["duplicate"] += "duplicate" in ticket.flags
         self._totals["resets"] += "gap_reset" in ticket.flags or "clock_reset" in ticket.flags
 
     def _count(self, what: str) -> None:
