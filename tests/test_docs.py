@@ -1,9 +1,9 @@
 """The documentation is true: its code runs, and its links lead somewhere. Its tables: test_docs_reference.py.
 
-Rules. Python blocks of a page run in order in one namespace, in a folder with a few recordings, against a real service:
-its address stands in for `SERVICE` in the text, and nothing else is changed. What is printed must be what a `text`
-block right below says. Commands of `sh` blocks are run likewise, but for those that don't end soon: the program itself
-parses them, no more. Lines of `json` blocks are messages of the protocol.
+Rules. Blocks of a page run in order, in a folder with a few recordings, against a real service: its address stands in
+for `SERVICE` in the text, and nothing else is changed. Python blocks share one namespace; what one prints must be what
+a `text` block right below says. Commands that don't end soon are only parsed, by the program itself. Lines of `json`
+blocks are messages of the protocol.
 """
 
 import io
@@ -34,15 +34,22 @@ SAMPLE = ROOT / "service" / "fervor" / "samples" / "joy.bvh"
 RECORDINGS = ("walk.bvh", "run.bvh")
 """Recordings of the reader's, in the pages."""
 
+LONG = frozenset({"serve", "demo", "train", "export"})
+"""Commands that don't end soon, or need what those leave."""
+
 HOSTS = ("127.0.0.1", "robot.local")
 """The only hosts that pages may name."""
 
 
-def with_blocks(language: str) -> list[Any]:
+def page_id(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def with_blocks(*languages: str) -> list[Any]:
     return [
-        pytest.param(page, id=str(page.relative_to(ROOT)))
+        pytest.param(page, id=page_id(page))
         for page in PAGES
-        if any(block.language == language for block in blocks(page))
+        if any(block.language in languages for block in blocks(page))
     ]
 
 
@@ -56,35 +63,52 @@ def short_sample(frames: int = 120) -> str:
     return f"{head}Frames: {frames}\n" + "".join(motion.splitlines(keepends=True)[: 1 + frames])
 
 
-@pytest.fixture
-def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(autouse=True)
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder to work in, with the reader's recordings."""
     for name in RECORDINGS:
         (tmp_path / name).write_text(short_sample(), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
-@pytest.mark.parametrize("page", with_blocks("python"))
-@pytest.mark.usefixtures("desk")
-def test_python_runs(page: Path, live: Live) -> None:
+@pytest.mark.parametrize("page", with_blocks("python", "sh"))
+def test_code_runs(page: Path, live: Live) -> None:
     namespace: dict[str, Any] = {"__name__": "docs"}
     said = ""
     for block in blocks(page):
-        if block.language == "text" and block.follows:
-            assert said == block.text, f"{page}, line {block.line}"
-        if block.language != "python":
-            continue
-        text = "\n" * (block.line - 1) + block.text.replace(SERVICE, live.address)
-        with redirect_stdout(io.StringIO()) as out:
-            exec(compile(text, str(page), "exec"), namespace)
-        said = out.getvalue()
+        where = f"{page}, line {block.line}"
+        match block.language:
+            case "python":
+                text = "\n" * (block.line - 1) + block.text.replace(SERVICE, live.address)
+                with redirect_stdout(io.StringIO()) as out:
+                    exec(compile(text, str(page), "exec"), namespace)
+                said = out.getvalue()
+            case "sh":
+                for command in commands(block):
+                    run_command(words(command.replace(SERVICE, live.address)), live, f"{where}: {command}")
+            case "text" if block.follows:
+                assert said == block.text, where
+
+
+def run_command(command: list[str], live: Live, where: str) -> None:
+    program, *arguments = command
+    match program:
+        case "fervor":
+            run_or_parse(arguments, live, where)
+        case "curl":
+            run_curl(arguments, where)
+        case "make":
+            makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+            assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
+        case ".":
+            assert arguments == [".venv/bin/activate"], where
+        case _:
+            pytest.fail(f"{where}: not a command that this test knows")
 
 
 def commands(block: Block) -> Iterator[str]:
-    yield from (
-        line for line in block.text.replace("\\\n", " ").splitlines() if line.strip() and not line.startswith("#")
-    )
+    lines = block.text.replace("\\\n", " ").splitlines()
+    yield from (line for line in lines if line.strip() and not line.startswith("#"))
 
 
 def words(command: str) -> list[str]:
@@ -95,64 +119,56 @@ def words(command: str) -> list[str]:
     return parts
 
 
-def ends_soon(arguments: list[str]) -> bool:
-    return (
-        arguments[0] not in {"serve", "demo", "train", "export"}
-        and "runs/" not in " ".join(arguments)
-        and (arguments[0] != "stream" or "--fast" in arguments)
-    )
-
-
-@pytest.mark.parametrize("page", with_blocks("sh"))
-def test_commands_run(page: Path, live: Live, desk: Path) -> None:
-    for block in blocks(page):
-        for command in commands(block) if block.language == "sh" else ():
-            program, *arguments = words(command.replace(SERVICE, live.address))
-            where = f"{page}, line {block.line}: {command}"
-            match program:
-                case "fervor" if ends_soon(arguments):
-                    with redirect_stdout(io.StringIO()):
-                        assert run_fervor(arguments) == 0, where
-                case "fervor":
-                    parse(arguments)
-                case "curl":
-                    run_curl(arguments, where)
-                case "make":
-                    assert re.search(rf"^{arguments[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE), where
-                case ".":
-                    assert arguments == [".venv/bin/activate"], where
-                case _:
-                    pytest.fail(f"{where}: not a command that this test knows")
+def run_or_parse(arguments: list[str], live: Live, where: str) -> None:
+    name, rest = arguments[0], arguments[1:]
+    endless = name in LONG or any(word.startswith("runs/") for word in rest)
+    if endless or (name == "stream" and "--fast" not in rest):
+        parse(arguments)
+        return
+    if name == "stream" and "--url" not in rest:
+        arguments = [*arguments, "--url", live.stream]  # it would look for a service at `SERVICE`
+    with redirect_stdout(io.StringIO()):
+        assert run_fervor(arguments) == 0, where
 
 
 def parse(arguments: list[str]) -> None:
     """Have the program read its arguments as it would; raises what it would complain of."""
     group = typer.main.get_command(build_app(arguments))
+    assert isinstance(group, typer.core.TyperGroup)
     with group.make_context("fervor", list(arguments)) as context:
         name, command, rest = group.resolve_command(context, [*context._protected_args, *context.args])
+        assert command is not None
         command.make_context(name, rest, parent=context)
 
 
 def run_curl(arguments: list[str], where: str) -> None:
     if shutil.which("curl") is None and not os.environ.get("CI"):
         return
-    done = subprocess.run(["curl", "--fail-with-body", *arguments], capture_output=True, text=True, timeout=60)
+    command = ["curl", "--fail-with-body", *arguments]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, f"{where}: {done.stdout}{done.stderr}"
 
 
 @pytest.mark.parametrize("page", with_blocks("json"))
 def test_json_is_protocol(page: Path) -> None:
-    adapter: TypeAdapter[Any] = TypeAdapter(messages.ClientMessage | messages.ServerMessage)
+    message: TypeAdapter[Any] = TypeAdapter(ClientMessage | ServerMessage)
     for block in blocks(page):
         for line in block.text.splitlines() if block.language == "json" else ():
-            adapter.validate_json(line, strict=True)
+            message.validate_json(line, strict=True)
 
 
-def test_blocks_have_a_language_that_says_what_becomes_of_them() -> None:
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_every_block_says_what_becomes_of_it(page: Path) -> None:
+    fences = re.findall(r"^```(.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(fences[::2]) <= {"python", "sh", "json", "text"}
+    assert set(fences[1::2]) <= {""}
+
+
+def test_extras_are_those_of_the_project() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     for page in PAGES:
-        fences = re.findall(r"^```(.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-        assert set(fences[::2]) <= {"python", "sh", "json", "text"}, page
-        assert set(fences[1::2]) <= {""}, page
+        for extra in re.findall(r"pip install [^`\n]*\[(\w+)\]", page.read_text(encoding="utf-8")):
+            assert extra in extras, page
 
 
 # --- links ------------------------------------------------------------------------------------------------------------
@@ -160,11 +176,10 @@ def test_blocks_have_a_language_that_says_what_becomes_of_them() -> None:
 
 def anchors(page: Path) -> set[str]:
     """What GitHub makes of headings."""
-    heads = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", page.read_text(), flags=re.M | re.S), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in headings(page)}
 
 
-@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=page_id)
 def test_links_lead_somewhere(page: Path) -> None:
     content = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)\s]+)\)", content):
@@ -182,14 +197,10 @@ def test_all_pages_are_in_the_index() -> None:
 
 
 def test_pages_that_the_code_speaks_of_exist() -> None:
-    titles = {
-        head for page in PAGES for head in re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    }
+    titles = {head for page in PAGES for head in headings(page)}
     for source in (path for top in ("service", "export", "clients") for path in (ROOT / top).rglob("*.py")):
         text = source.read_text(encoding="utf-8")
         for title in re.findall(r'docs, "([^"]+)"', text):
             assert title in titles, f"{source} speaks of the page {title!r}"
         for path in re.findall(r"docs/[\w/-]+\.md", text):
             assert (ROOT / path).exists(), f"{source} speaks of {path}"
-
-
