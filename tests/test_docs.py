@@ -16,6 +16,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import redirect_stdout
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,13 @@ def run_command(command: list[str], live: Live, where: str) -> None:
             run_or_parse(arguments, live, where)
         case "curl":
             run_curl(arguments, where)
+        case "docker":  # too slow to run here: the file it reads must know what is asked of it
+            assert arguments[0] == "compose", where
+            compose = (ROOT / "compose.yaml").read_text(encoding="utf-8")
+            profiles = [name for option, name in pairwise(arguments) if option == "--profile"]
+            assert all(f"profiles: [{name}]" in compose for name in profiles), where
+        case variable if "=" in variable:
+            run_command(arguments, live, where)
         case "make":
             makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
             assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
