@@ -27,7 +27,8 @@ def test_a_body_stays_the_same_while_it_is_seen():
     people = roster()
     first = see(people, "a", 0.0)
     assert see(people, "a", 9.0) is first
-    assert people.find("a") is people.known("a") is first
+    assert people.find("a", 9.0) is people.known("a") is first
+    assert people.find("a", 20.0) is None
     assert [body.name for body in people] == ["a"]
 
 

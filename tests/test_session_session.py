@@ -130,6 +130,18 @@ def test_a_duplicate_of_a_frame_under_way_gets_that_frames_answer():
     assert talk.session.totals.duplicate == 1
 
 
+def test_answers_leave_in_the_order_of_their_frames_whatever_runs_first():
+    talk = Talk(start=SessionStart())
+    tickets = [
+        event for seq, body in ((0, "a"), (1, "a"), (0, "b")) for event in talk.session.receive(frame(seq, body=body))
+    ]
+    outcomes = [talk.engine.run([ticket])[0] for ticket in tickets]
+    assert talk.carry(talk.session.conclude(tickets[2], outcomes[2])) == []
+    assert [(m.body, m.seq) for m in talk.carry(talk.session.conclude(tickets[0], outcomes[0]))] == [("a", 0)]
+    said = talk.carry(talk.session.conclude(tickets[1], outcomes[1]))
+    assert [(message.body, message.seq) for message in said] == [("a", 1), ("b", 0)]
+
+
 def test_the_wrong_message_at_the_wrong_time_is_fatal():
     talk = Talk()
     (error,) = talk.say(frame(0))

@@ -31,9 +31,10 @@ class Roster:
     def __iter__(self) -> Iterator[Body]:
         return iter(self._bodies.values())
 
-    def find(self, name: str) -> Body | None:
-        """The body called `name`, if it is there."""
-        return self._bodies.get(name)
+    def find(self, name: str, time: float) -> Body | None:
+        """The body called `name`, if it is there and at `time` (seconds, client clock) not to be forgotten."""
+        body = self._bodies.get(name)
+        return None if body is None or self._is_idle(body, time) else body
 
     def known(self, name: str) -> Body:
         """The body called `name`.

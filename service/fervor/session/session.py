@@ -75,6 +75,7 @@ class Session:
         self._agreement: Agreement | None = None
         self._roster = Roster(host.claim, most=host.limits.max_bodies, idle_s=host.limits.body_idle_s)
         self._tickets: dict[Ticket, tuple[Body, int]] = {}  # under way → its body, its place in the group
+        self._outcomes: dict[Ticket, Outcome | EngineError] = {}  # that wait for those of earlier tickets
         self._groups = Groups()
         self._calibrating: Calibrating | None = None
         self._totals = Totals().model_dump()
@@ -102,11 +103,20 @@ class Session:
         return [reply, *self._close(error.close_code, error.code)] if error.close_code else [reply]
 
     def conclude(self, ticket: Ticket, outcome: Outcome | EngineError) -> list[Event]:
-        """What a ticket's outcome brings: its estimate, or the error of a failed run, and a waiting end."""
-        entry = self._tickets.pop(ticket, None)
-        if entry is None or self.state is SessionState.CLOSED:
+        """What a ticket's outcome brings: its estimate, or the error of a failed run, and a waiting end.
+
+        Outcomes may come in any order over the bodies; answers leave in the order in which the frames came.
+        """
+        if ticket not in self._tickets or self.state is SessionState.CLOSED:
             return []
-        body, place = entry
+        self._outcomes[ticket] = outcome
+        events: list[Event] = []
+        while self._tickets and (oldest := next(iter(self._tickets))) in self._outcomes:
+            events += self._conclude(oldest, self._outcomes.pop(oldest))
+        return events
+
+    def _conclude(self, ticket: Ticket, outcome: Outcome | EngineError) -> list[Event]:
+        body, place = self._tickets.pop(ticket)
         events: list[Event] = []
         if isinstance(outcome, EngineError):
             events += self._fail(ticket, body, outcome)
@@ -233,7 +243,7 @@ class Session:
         agreement = self._agreed
         time = agreement.time_of(frame)
         pose = agreement.pose_of(frame)
-        known = self._roster.find(frame.body)
+        known = self._roster.find(frame.body, time)
         if known is not None and (answer := known.answered(frame.seq)) is not None:
             self._count("duplicate")
             if group is None:
@@ -309,6 +319,7 @@ class Session:
 
     def _release_all(self) -> list[Event]:
         self._tickets.clear()
+        self._outcomes.clear()
         return [*self._roster.clear()]
 
     def _note(self, ticket: Ticket) -> None:
