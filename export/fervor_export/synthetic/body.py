@@ -81,6 +81,7 @@ def _trunk(frames: _Frames) -> _Trunk:
     breath = style["breath"] * np.sin(2.0 * np.pi * person.breath_hz * times + script.unrest.breath)
     shake, rock = _laughter(script.laughs, times)
     yaw, roll, pitch = (frames.walking * wave for wave in gait.trunk(frames.phase, style["stride"]))
+    bouncy = 1.0 + 0.4 * style["bounce"]  # a bouncing gait nods more
     sway = 1.4 * script.unrest.sway.at(times) * (style["sway"] * person.unrest)[:, None]
     fine = 0.25 * frames.texture[:, :9].reshape(-1, 3, 3)
 
@@ -88,7 +89,10 @@ def _trunk(frames: _Frames) -> _Trunk:
     pelvis, spine, chest, head = (angles[:, index] for index in range(4))
     pelvis += np.stack((scene.pelvis + hinge * lean + 0.3 * sway[:, 0], yaw, roll), axis=-1)
     spine += (
-        moved[:, Torso.SPINE] + 1.3 * sway[:, 0:3] + fine[:, 0] + np.stack((pitch, -1.3 * yaw, -0.9 * roll), axis=-1)
+        moved[:, Torso.SPINE]
+        + 1.3 * sway[:, 0:3]
+        + fine[:, 0]
+        + np.stack((pitch * bouncy, -1.3 * yaw, -0.9 * roll), axis=-1)
     )
     spine[:, 0] += -0.8 * scene.pelvis + (0.85 - hinge) * lean + 0.35 * slump + 0.35 * bounce + rock + 0.6 * shake
     chest += moved[:, Torso.THORAX] + 0.7 * sway[:, 3:6] + 0.5 * fine[:, 1]
@@ -137,12 +141,13 @@ def _arms(frames: _Frames, trunk: _Trunk) -> Array:
     wrist = wrist + 0.006 * drift[:, 2:8].reshape(-1, 2, 3) * frames.style["sway"][:, None, None]
     wrist = arm.outside_body(wrist + (0.0012 + 0.010 * speed[..., None]) * fine[..., :3] + 0.0035 * tremor[..., :3])
     flap = fine[..., 3] * (1.0 + 7.0 * speed)
+    spread = 0.6 * hands[..., Hand.SWING] * frames.style["width"][:, None]  # open bodies turn hanging elbows out, too
     shoulder = np.zeros_like(wrist)
     shoulder[..., 0], shoulder[..., 1] = arm.SHOULDER, trunk.shrug[:, None]
     turns = arm.solve(
         wrist,
         shoulder,
-        elbow_out=np.maximum(hands[..., Hand.ELBOW] + 2.0 * drift[:, 8:10], -2.0),
+        elbow_out=np.maximum(hands[..., Hand.ELBOW] + 2.0 * drift[:, 8:10] + spread, -2.0),
         palm=np.clip(hands[..., Hand.PALM] + tremor[..., 3] + 3.0 * drift[:, 10:12], -85.0, 85.0),
         bend=np.clip(hands[..., Hand.BEND] + tremor[..., 4] + 2.5 * drift[:, 12:14] + flap, -65.0, 65.0),
         side=np.clip(hands[..., Hand.SIDE] + 0.7 * tremor[..., 5] + 0.5 * flap, -28.0, 22.0),
@@ -162,7 +167,8 @@ def _wrists(frames: _Frames, trunk: _Trunk, hands: Array) -> Array:
     neck = rotations.rotate(below, np.array([0.0, LUMBAR, 0.0]))
     neck = neck + rotations.rotate(thorax, np.array([0.0, THORACIC, 0.0]))
     shift = np.stack((neck, neck * _MIRROR), axis=1) - np.array([0.0, LUMBAR + THORACIC, 0.0])
-    room = hands[..., Hand.ROOM] * scale - hands[..., Hand.FROM_ROOM, None] * shift + _swing(frames, hands)
+    room = hands[..., Hand.ROOM] * scale - hands[..., Hand.FROM_ROOM, None] * shift
+    room = room + hands[..., Hand.SWING, None] * (_swing(frames) + _carriage(frames.style)[:, None])
     to_chest = rotations.conjugate(np.stack((thorax, rotations.mirror(thorax)), axis=1))  # [frame, 2, 4]
     wrists: Array = hands[..., Hand.CHEST] + rotations.rotate(to_chest, room)
     return wrists
@@ -175,17 +181,24 @@ def _speed(hands: Array, times: Array) -> Array:
     return speed
 
 
-def _swing(frames: _Frames, hands: Array) -> Array:
-    """How far walking displaces the hanging hands [frame, 2, 3] in metres; elbows bend in front."""
+def _carriage(style: dict[str, Array]) -> Array:
+    """How mood displaces hanging hands [frame, 3] in metres.
+
+    Open bodies carry the arms off the trunk, tense ones bend the elbows (Roether et al. 2009: fear and anger).
+    """
+    tense = np.maximum(style["shrug"], 0.0)
+    return np.stack((0.0022 * style["width"], 1.1 * tense, 0.9 * tense), axis=-1)
+
+
+def _swing(frames: _Frames) -> Array:
+    """How far walking displaces hanging hands [frame, 2, 3] in metres; elbows bend in front."""
     person, style = frames.script.person, frames.style
     length = person.upper_arm + person.forearm
     wave = frames.walking * gait.arm_swing(frames.phase)  # [frame, 2]
     amplitude = np.radians(17.0 * style["swing"] * style["stride"] * person.size**0.7)[:, None]
     angle = amplitude * (wave + 0.15 * frames.walking)
     bent = 0.085 * np.minimum(style["swing"] * person.size, 1.7)[:, None] * np.maximum(wave + 0.6 * frames.walking, 0.0)
-    swing = np.stack((-0.02 * wave, length * (1.0 - np.cos(angle)) + bent, length * np.sin(angle)), axis=-1)
-    swung: Array = swing * hands[..., Hand.SWING, None]
-    return swung
+    return np.stack((-0.02 * wave, length * (1.0 - np.cos(angle)) + bent, length * np.sin(angle)), axis=-1)
 
 
 def _legs(frames: _Frames, trunk: _Trunk) -> Array:

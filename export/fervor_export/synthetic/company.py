@@ -91,7 +91,9 @@ class Company:
 
     def startle(self, time: float, size: float) -> None:
         """Start back: head and shoulders first, within a fifth of a second, then let go (Landis & Hunt 1939)."""
-        step = size * turn(spine=(-9.0, 0.0, 0.0), thorax=(-4.0, 0.0, 0.0), head=self.noise(0.0, 6.0, 0.0), shrug=0.035)
+        step = size * turn(
+            spine=(-11.0, 0.0, 0.0), thorax=(-5.0, 0.0, 0.0), head=self.noise(0.0, 6.0, 0.0), shrug=0.035
+        )
         step[Torso.HEAD.start] -= 9.0 * size
         self.trunk.push(time, float(self.rng.uniform(0.16, 0.3)), step)
         self.trunk.push(time + float(self.rng.uniform(0.4, 1.4)), float(self.rng.uniform(0.8, 2.0)), -0.8 * step)

@@ -10,6 +10,7 @@ import numpy as np
 from fervor.emotions import EMOTIONS
 from fervor_export.clip import RATE_HZ, Clip
 from fervor_export.synthetic import body
+from fervor_export.synthetic.channels import INDEX
 from fervor_export.synthetic.director import Director
 from fervor_export.synthetic.manner import Course, Manner, habit
 from fervor_export.synthetic.motion import STARTLING, constant
@@ -51,7 +52,7 @@ def _clip(rng: np.random.Generator, cast: list[Person], index: int, *, votes: bo
     events = _events(rng, displayed, seconds)
     scene = Scene.draw(rng)
     manner = Manner.draw(rng, displayed, _course(rng, displayed, level, seconds, events), person)
-    script = Director(rng, person, scene, manner, seconds).write(events)
+    script = Director(rng, person, scene, manner, seconds=seconds, events=events).write()
     times = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     share = named(intended, displayed, visible(script, times))
     rotations, mask = sense(rng, body.pose(script, times))
@@ -68,13 +69,20 @@ def _clip(rng: np.random.Generator, cast: list[Person], index: int, *, votes: bo
 
 
 def visible(script: Script, times: Array) -> float:
-    """How much of its emotion a take shows (see `Manner.visible`), counting the gestures that were really made."""
+    """How much of its emotion a take shows (see `Manner.visible`), judged by what really happens in it."""
     window = float(times[-1])
-    made, own = (_within(stretches, window) for stretches in (script.gestures, script.emblems))
+    gesturing, own = (_within(stretches, window) for stretches in (script.gestures, script.emblems))
+    laughing = _within([(bout.start, bout.start + bout.duration) for bout in script.laughs], window)
+    began = any(-0.2 < event < window - 0.3 for event in script.events)
     seen = script.scene.seen()
-    emblems = own / made * min(1.0, made / (0.25 * window)) if made > 0.0 else 0.0
-    own_way = habit(script.person, script.scene)
-    return script.manner.visible(times, seen, emblems if seen["gesture"] > 0.5 else None, own_way)
+    seen["gesture"] *= 0.25 + 0.75 * min(1.0, gesturing / (0.4 * window))
+    strong = float(script.manner.strong[INDEX["start"]])
+    realised = {
+        "emblem": min(1.0, own / (0.4 * window)),
+        "laugh": laughing / window,
+        "start": strong * float(script.manner.course(times).max()) * began,
+    }
+    return script.manner.visible(times, seen, realised, habit(script.person, script.scene))
 
 
 def _within(stretches: list[Stretch], window: float) -> float:

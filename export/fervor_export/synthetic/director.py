@@ -24,9 +24,18 @@ ORIGIN = np.array([SHOULDER, 0.0, 0.0])
 
 
 class Director:
-    """Writes one script."""
+    """Writes one script; `events` are the seconds at which the emotion visibly begins."""
 
-    def __init__(self, rng: np.random.Generator, person: Person, scene: Scene, manner: Manner, seconds: float) -> None:
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        person: Person,
+        scene: Scene,
+        manner: Manner,
+        *,
+        seconds: float,
+        events: tuple[float, ...] = (),
+    ) -> None:
         self.rng, self.person, self.scene, self.manner = rng, person, scene, manner
         self.rest = self.rest_pose(manner.at(0.0)["emblem"])  # [Hand.DIM] where the hands lie between gestures
         self.script = Script(
@@ -39,16 +48,17 @@ class Director:
             legs=Track(np.zeros(Legs.DIM)),
             unrest=Unrest.draw(rng, person),
             way=float(rng.choice((-1.0, 1.0))),
+            events=tuple(sorted(events)),
         )
         self.company = Company(rng, self.script)
 
-    def write(self, events: tuple[float, ...] = ()) -> Script:
-        """The whole plan; `events` are the seconds at which the emotion visibly begins."""
-        for event in events:
+    def write(self) -> Script:
+        """The whole plan."""
+        for event in self.script.events:
             self.company.event(event)
         begun = self.rng.random() < 0.75  # else the take begins at rest
         time = -float(self.rng.uniform(0.0, 5.0)) if begun else float(self.rng.uniform(0.1, 1.0))
-        waiting = sorted(events)
+        waiting = list(self.script.events)
         while time < self.script.seconds:
             urgent = bool(waiting) and time >= waiting[0] - 0.25
             if urgent:

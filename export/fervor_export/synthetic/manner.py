@@ -48,7 +48,7 @@ class Manner:
         values = self.over(np.array([time]))[0]
         return {channel.name: float(value) for channel, value in zip(CHANNELS, values, strict=True)}
 
-    def visible(self, times: Array, seen: dict[str, float], emblems: float | None, habit: Array) -> float:
+    def visible(self, times: Array, seen: dict[str, float], realised: dict[str, float], habit: Array) -> float:
         """How much of the emotion shows: 0 as in a weak, 1 as in a strong take of an average person.
 
         Every channel counts by how many just noticeable differences it moves between weak and strong. Viewers go by
@@ -57,19 +57,18 @@ class Manner:
         Args:
             times: frames of the take.
             seen: how well each kind of channel (`Channel.seen_in`) can be seen in it, 0 to 1.
-            emblems: share of the emotion's own gestures really made, relative to the time for gestures; None where the
-                take has no gestures.
+            realised: channels of single events and what really came of them in the take; that and what was meant
+                count alike.
             habit: [channel] how the person differs from others whatever they feel, in just noticeable differences.
                 Viewers don't know the person, and take half of it for expression.
         """
         weak, strong, _ = bounds(self.emotion)
         whole = distance(weak, strong)  # [channel]
-        values = self.over(times)  # [frame, channel]
-        if emblems is not None:
-            values = values.copy()
-            values[:, INDEX["emblem"]] = 0.5 * values[:, INDEX["emblem"]] + 0.5 * emblems
+        values = self.over(times).copy()  # [frame, channel]
+        for name, value in realised.items():
+            values[:, INDEX[name]] = 0.5 * values[:, INDEX[name]] + 0.5 * value
         shown = (distance(weak, values) + 0.5 * habit) * np.sign(whole)
-        weight = np.array([seen.get(kind, 1.0) for kind in SEEN_IN])
+        weight = np.array([seen[kind] for kind in SEEN_IN])
         per_frame = (shown * weight).sum(axis=1) / max(float((np.abs(whole) * weight).sum()), 1e-9)
         return float(0.55 * per_frame.mean() + 0.45 * np.percentile(per_frame, 85))
 

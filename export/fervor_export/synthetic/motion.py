@@ -10,7 +10,7 @@ from fervor_export.synthetic.person import Person
 from fervor_export.synthetic.scene import Scene
 from fervor_export.synthetic.tracks import Array
 
-STARTLING = {"surprise": 1.0, "fear": 0.6, "disgust": 0.45, "relief": 0.75}
+STARTLING = {"surprise": 1.0, "fear": 0.7, "disgust": 0.5, "relief": 0.9}
 """Emotion → how often its takes contain the moment it begins."""
 
 
@@ -52,6 +52,6 @@ def synthesise_motion(
     scene = scene or Scene.draw(rng)
     course = intensity if callable(intensity) else constant(float(intensity))
     manner = Manner.draw(rng, EMOTIONS[emotion_index(emotion)], course, person)
-    script = Director(rng, person, scene, manner, seconds).write(events)
+    script = Director(rng, person, scene, manner, seconds=seconds, events=events).write()
     times = np.arange(round(seconds * rate_hz)) / rate_hz
     return times, body.pose(script, times)

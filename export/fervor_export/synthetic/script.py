@@ -96,6 +96,7 @@ class Script:
     legs: Track  # [Legs.DIM] added to the scene's
     unrest: Unrest
     way: float  # -1 or 1: the side to which the head turns away
+    events: tuple[float, ...] = ()  # seconds at which the emotion visibly begins
     laughs: list[Laugh] = field(default_factory=list)
     emblems: list[Stretch] = field(default_factory=list)  # when the emotion's own gestures were made
     gestures: list[Stretch] = field(default_factory=list)  # when any were made

@@ -104,13 +104,13 @@ TABLE: dict[str, Row] = {
         "stride": (1, 0.95, 0.06),
     },
     "fear": {
-        "slump": (0, 11, 6),  # W A: shrinking
-        "lean": (0, -10, 6),  # M A: retreat
+        "slump": (0, 13, 6),  # W A: shrinking
+        "lean": (0, -11, 6),  # M A: retreat
         "head": (0, -1, 8),
         "aside": (4, 13, 7),  # looking about
         "shrug": (0, 0.05, 0.015),  # D R: shoulders up, tensed
         "reach": (1, 0.75, 0.2),
-        "height": (0, 0.15, 0.06),  # D: hands up
+        "height": (0, 0.18, 0.06),  # D: hands up
         "width": (0, -13, 8),  # D K: arms held in
         "tempo": (1, 1.4, 0.3),
         "rate": (0.4, 0.34, 0.15),
@@ -118,11 +118,11 @@ TABLE: dict[str, Row] = {
         "hold": (1, 2.0, 0.4),  # freezing
         "emblem": (0.05, 0.85, 0.12),
         "trunk": (0.35, 0.5, 0.2),
-        "tremble": (0, 1.8, 0.7),
+        "tremble": (0, 2.2, 0.7),
         "sway": (1, 1.4, 0.4),
         "breath": (1, 1.9, 0.4),
         "nod": (1, 1.5, 0.5),
-        "start": (0, 0.8, 0.3),
+        "start": (0, 0.9, 0.3),
         "swing": (1, 0.45, 0.2),  # H R: lower arms only
         "cadence": (1, 1.1, 0.1),  # H: short, fast
         "stride": (1, 0.78, 0.08),
@@ -149,22 +149,22 @@ TABLE: dict[str, Row] = {
         "stride": (1, 1.1, 0.05),
     },
     "relief": {
-        "slump": (0, 8, 6),  # D: release of tension
-        "lean": (0, -5, 6),
+        "slump": (0, 11, 6),  # D: release of tension
+        "lean": (0, -6, 5),
         "head": (0, 0, 14),  # back, or down: by person
         "tilt": (3, 6, 4),
         "shrug": (0, -0.02, 0.01),
         "reach": (1, 0.9, 0.2),
         "height": (0, -0.03, 0.05),
-        "tempo": (1, 0.72, 0.1),
-        "rate": (0.4, 0.28, 0.1),
+        "tempo": (1, 0.64, 0.1),
+        "rate": (0.4, 0.24, 0.1),
         "jerk": (0.2, 0.05, 0.05),
         "hold": (1, 1.4, 0.3),
         "emblem": (0.05, 0.85, 0.12),
         "trunk": (0.35, 0.5, 0.2),
-        "breath": (1, 2.7, 0.5),  # the sigh
+        "breath": (1, 3.0, 0.5),  # the sigh
         "nod": (1, 0.9, 0.3),
-        "start": (0, 1.0, 0.25),  # the sigh itself
+        "start": (0, 1.2, 0.3),  # the sigh itself
         "swing": (1, 0.9, 0.2),
         "cadence": (1, 0.92, 0.04),
     },
@@ -214,9 +214,9 @@ TABLE: dict[str, Row] = {
         "stride": (1, 0.85, 0.06),
     },
     "surprise": {
-        "slump": (0, -7, 5),  # A D: sudden upright, backward
-        "lean": (0, -7, 6),
-        "head": (0, -7, 7),
+        "slump": (0, -9, 5),  # A D: sudden upright, backward
+        "lean": (0, -9, 5),
+        "head": (0, -9, 6),
         "shrug": (0, 0.03, 0.015),
         "reach": (1, 1.35, 0.25),
         "height": (0, 0.14, 0.06),  # A: hands up
@@ -229,7 +229,7 @@ TABLE: dict[str, Row] = {
         "trunk": (0.35, 0.65, 0.2),
         "breath": (1, 1.4, 0.3),
         "nod": (1, 1.3, 0.3),
-        "start": (0, 1.0, 0.25),
+        "start": (0, 1.2, 0.25),
         "swing": (1, 1.0, 0.2),
         "stride": (1, 0.95, 0.06),
     },
