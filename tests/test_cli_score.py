@@ -10,9 +10,11 @@ import pytest
 from bodies import model
 from fervor.cli.main import run
 from fervor.protocol.messages import Estimate
+from fervor.protocol.skeleton_spec import SkeletonSpec
+from fervor.recordings.reader import read_recording
 from fervor.server.scoring_models import ScoreResponse
 from live import Live
-from program import write_bvh
+from program import fervor, write_bvh
 
 
 @pytest.fixture
@@ -155,3 +157,17 @@ def test_real_files(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> No
     files = sorted(map(str, shared_data.glob("*/*.bvh")))
     assert run(["score", *files, "--emotion", "joy", "--csv"]) == 0
     assert [row["file"] for row in csv.DictReader(io.StringIO(capsys.readouterr().out))] == files
+
+
+def test_a_calibrated_skeleton_serves_here_but_is_not_sent(tmp_path: Path) -> None:
+    recording = write_bvh(tmp_path / "wave.bvh")
+    spec = SkeletonSpec.of(read_recording(recording).skeleton, name="lab")
+    (tmp_path / "lab.json").write_text(spec.model_dump_json(), encoding="utf-8")
+    plain, kept = (
+        json.loads(fervor("score", recording, "--json", *more).stdout)["sequences"][0]["intensity"]
+        for more in ((), ("--skeleton", tmp_path / "lab.json"))
+    )
+    assert plain == kept
+    ran = fervor("score", recording, "--skeleton", tmp_path / "lab.json", "--url", "http://127.0.0.1:1")
+    assert ran.returncode == 65
+    assert "a service takes no file" in ran.stderr

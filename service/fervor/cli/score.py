@@ -23,7 +23,9 @@ def score(
     files: Annotated[list[Path], typer.Argument(metavar="FILES...", help="Motion files (BVH, MVNX, CSV, JSONL, NPZ).")],
     *,
     emotion: Annotated[str | None, typer.Option(help="The emotion meant, for all files; default: unknown.")] = None,
-    skeleton: Annotated[str | None, typer.Option(help="Of tables that don't name theirs, as in /v1/skeletons.")] = None,
+    skeleton: Annotated[
+        str | None, typer.Option(help="Of tables that don't name theirs: a name, or a JSON file as calibrate writes.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, the same as POST /v1/score/file.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Write CSV.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="With --json or --csv: every estimate.")] = False,

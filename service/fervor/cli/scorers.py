@@ -8,10 +8,10 @@ from urllib.request import Request, urlopen
 
 from pydantic import ValidationError
 
-from fervor.errors import AuthError, FervorError, InputError, Overloaded, RequestError
+from fervor.cli.recordings import find_skeleton, read
+from fervor.errors import AuthError, FervorError, InputError, Overloaded, RequestError, Unreachable
 from fervor.model import Model, check_row_independence, default_model_path
 from fervor.protocol.messages import ModelInfo
-from fervor.recordings.reader import read_recording
 from fervor.recordings.source import read_content
 from fervor.scoring import Scorer
 from fervor.server.model_info import model_info
@@ -20,13 +20,6 @@ from fervor.server.scoring_models import FileOptions, ScoreResponse, SequenceSco
 
 PATIENCE_S = 600.0
 """How long a service may take over one file, seconds."""
-
-
-class Unreachable(FervorError):
-    """No service answers at the address."""
-
-    code = "unreachable"
-    exit_code = 69
 
 
 class Here:
@@ -46,7 +39,7 @@ class Here:
         Raises:
             InputError: the file or the emotion can't be used.
         """
-        recording = read_recording(file, skeleton=self._options.skeleton)
+        recording = read(file, skeleton=self._options.skeleton)
         scored = score_recording(self._scorer, self._metadata, recording, self._options)
         return scored.model_copy(update={"name": str(file)})
 
@@ -58,6 +51,10 @@ class Remote:
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.netloc:
             raise InputError(f"{url!r} is not the address of a service; expected one like http://127.0.0.1:8080")
+        if not isinstance(find_skeleton(options.skeleton), str | None):
+            raise InputError(
+                f"a service takes no file {options.skeleton!r}; expected the name of a skeleton it keeps (--skeletons)"
+            )
         self._url = f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}/v1/score/file"
         self._options = options
         self._token = token

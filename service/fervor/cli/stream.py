@@ -12,9 +12,9 @@ import fervor_client
 from fervor.cli.local import own_service
 from fervor.cli.main import BROKEN_PIPE, INTERRUPTED
 from fervor.cli.playing import Take, play
+from fervor.cli.recordings import read
 from fervor.cli.screens import Complaints, pick_screen, say
 from fervor.protocol.messages import Clock, Memory
-from fervor.recordings.reader import read_recording
 
 
 def stream(
@@ -28,7 +28,7 @@ def stream(
         ),
     ] = None,
     skeleton: Annotated[
-        str | None, typer.Option(help="What a CSV, JSONL or NPZ was recorded with, where it does not say.")
+        str | None, typer.Option(help="What it was recorded with: a name, or a JSON file as calibrate writes.")
     ] = None,
     token: Annotated[str | None, typer.Option(envvar="FERVOR_TOKEN", help="For a service that wants one.")] = None,
     body: Annotated[str, typer.Option(help="Name of the person, for the service.")] = "0",
@@ -44,7 +44,7 @@ def stream(
 
     Estimates go to standard output: as a live meter on a terminal, as plain lines into a pipe or file.
     """
-    take = Take.of(read_recording(file, skeleton=skeleton))
+    take = Take.of(read(file, skeleton=skeleton))
 
     async def run(address: str) -> None:
         async with fervor_client.connect(
