@@ -58,9 +58,9 @@ def asyncapi(version: str) -> dict[str, Any]:
 
 
 _DESCRIPTION = f"""Poses in, intensities out. Subprotocols: {", ".join(f"`{name}`" for name in CODECS)}:
-the same messages as JSON text or as MessagePack maps; in MessagePack the joints `q` and `p` of a frame may be raw little-endian float32. A
-token goes into `Authorization: Bearer` or, in browsers, into a subprotocol entry `fervor.token.TOKEN`. Recoverable
-errors keep the connection; a fatal one precedes its close."""
+the same messages as JSON text or as MessagePack maps; in MessagePack the joints `q` and `p` of a frame may be raw
+little-endian float32. A token goes into `Authorization: Bearer` or, in browsers, into a subprotocol entry
+`fervor.token.TOKEN`. Recoverable errors keep the connection; a fatal one precedes its close."""
 
 
 def _messages(union: Any, schemas: dict[str, Any]) -> dict[str, Any]:
