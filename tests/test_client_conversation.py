@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import fervor_client.conversation as module
-from fervor.errors import EngineError, FrameError, InputError, ProtocolError, RateExceeded
+import fervor_client.answers as module
+from fervor.errors import EngineError, FrameError, InputError, ProtocolError, RateExceeded, Unreachable
 from fervor.protocol.codec import CODECS
 from fervor.protocol.messages import (
     Error,
@@ -24,9 +24,9 @@ from fervor.protocol.messages import (
     SessionStarted,
     Totals,
 )
-from fervor_client.conversation import Conversation, State
-from fervor_client.failures import Unreachable
+from fervor_client.conversation import Conversation
 from fervor_client.options import Options, opening
+from fervor_client.standing import State
 
 CODEC = CODECS["fervor.v1.json"]
 POSE = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
@@ -49,8 +49,8 @@ def hear(conversation: Conversation, *messages: ServerMessage) -> list[Exception
     return [error for message in messages for error in conversation.receive(CODEC.encode(message))]
 
 
-def sent(payload: str | bytes) -> Frame:
-    frame = CODEC.decode_client(payload)
+def sent(conversation: Conversation) -> Frame:
+    frame = CODEC.decode_client(conversation.next_payload() or "")
     assert isinstance(frame, Frame)
     return frame
 
@@ -71,7 +71,8 @@ def test_a_conversation_goes_through_its_states() -> None:
     assert conversation.state is State.STARTING
     hear(conversation, STARTED)
     assert conversation.state is State.OPEN
-    assert CODEC.decode_client(conversation.end()).type == "session.end"
+    conversation.end()
+    assert CODEC.decode_client(conversation.next_payload() or "").type == "session.end"
     assert conversation.state is State.ENDING
     hear(conversation, SessionEnded(reason="bye", totals=Totals(frames=3)))
     assert conversation.over
@@ -81,22 +82,25 @@ def test_a_conversation_goes_through_its_states() -> None:
 
 def test_seq_and_time_are_filled_in_per_body() -> None:
     conversation = start()
-    frames = [sent(conversation.frame(POSE, body=body)[1]) for body in ("a", "b", "a", "a", "b")]
+    for body in ("a", "b", "a", "a", "b"):
+        conversation.frame(POSE, body=body)
+    frames = [sent(conversation) for _ in range(5)]
     assert [(frame.body, frame.seq) for frame in frames] == [("a", 0), ("b", 0), ("a", 1), ("a", 2), ("b", 1)]
     assert [frame.t for frame in frames] == [10.0, 11.0, 12.0, 13.0, 14.0]
 
 
 def test_a_seq_of_the_caller_goes_on_from_there_and_never_back() -> None:
     conversation = start()
-    seqs = [conversation.frame(POSE, seq=seq)[0] for seq in (7, None, 3, None)]
+    seqs = [conversation.frame(POSE, seq=seq) for seq in (7, None, 3, None)]
     assert seqs == [7, 8, 3, 9]
 
 
 def test_everything_given_is_sent() -> None:
-    number, payload = start().frame(
+    conversation = start()
+    number = conversation.frame(
         POSE, body="a", seq=4, t=np.float32(1.5), emotion={"joy": 0.25}, mask=np.array([True, False])
     )
-    frame = sent(payload)
+    frame = sent(conversation)
     assert number == 4
     assert (frame.body, frame.seq, frame.t, frame.emotion, frame.mask) == ("a", 4, 1.5, {"joy": 0.25}, (True, False))
     assert frame.q == ((0.0, 0.0, 0.0, 1.0),) * 2
@@ -194,7 +198,7 @@ def test_an_end_without_an_answer_is_said_to_who_awaits_it() -> None:
     assert conversation.next_estimate() is None
 
 
-@pytest.mark.parametrize("payload", ["not json", b"\x00", '{"type": "estimate"}', '{"type": "surprise"}'])
+@pytest.mark.parametrize("payload", ["not json", b"\x00", '{"type": "estimate"}', '{"type": 3}', "[1]"])
 def test_a_message_that_cannot_be_read_ends_it(payload: str | bytes) -> None:
     conversation = start()
     conversation.receive(payload)
@@ -219,7 +223,7 @@ def test_a_bad_frame_is_refused_before_it_is_sent(bad: dict[str, object], senten
     with pytest.raises(FrameError, match=sentence):
         conversation.frame(bad.pop("q", POSE), **bad)  # type: ignore[arg-type]
     assert conversation.in_flight == 0
-    assert conversation.frame(POSE)[0] == 0
+    assert conversation.frame(POSE) == 0
 
 
 def test_nothing_can_be_sent_before_the_start_or_after_the_end() -> None:
@@ -249,6 +253,21 @@ def test_memory_is_bounded_where_nobody_reads(
         hear(conversation, *(estimate(seq) for seq in range(10)))
     assert len(caplog.records) == 1
     assert [conversation.next_estimate() for _ in range(4)] == [estimate(7), estimate(8), estimate(9), None]
+
+
+def test_a_message_of_a_type_from_the_future_is_passed_over() -> None:
+    conversation = start()
+    assert conversation.receive('{"type": "surprise", "body": 3}') == []
+    assert conversation.state is State.OPEN
+
+
+def test_a_frame_under_way_is_not_sent_twice() -> None:
+    conversation = start()
+    conversation.frame(POSE, seq=3)
+    with pytest.raises(FrameError, match="frame 3 of body '0' is under way"):
+        conversation.frame(POSE, seq=3)
+    hear(conversation, estimate(3))
+    assert conversation.frame(POSE, seq=3) == 3
 
 
 def test_a_ping_is_sent_and_its_pong_says_nothing() -> None:

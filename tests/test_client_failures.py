@@ -19,9 +19,10 @@ from fervor.errors import (
     ProtocolError,
     RateExceeded,
     RequestError,
+    Unreachable,
 )
 from fervor.protocol.messages import Error
-from fervor_client.failures import Unreachable, check_subprotocol, closed, refused, told
+from fervor_client.failures import check_subprotocol, closed, refused, told
 
 URL = "ws://robot:8080/v1/stream"
 

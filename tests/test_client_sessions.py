@@ -170,8 +170,8 @@ class AsyncAsSync:
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result()
 
 
-@pytest.fixture(params=["async", "sync"])
-def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
+@pytest.fixture(params=["async", "sync"], name="connect")
+def twin(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     """`connect` of one of the twins, with the names of the sync one."""
     if request.param == "sync":
         yield fervor_client.sync.connect
@@ -254,6 +254,7 @@ def test_what_was_asked_for_is_in_the_start(connect: Callable[..., Any]) -> None
             joints=("a", "b"),
             delivery="latest",
             memory="stateful",
+            checkpoint_s=1.0,
         )
     ]
 
@@ -417,7 +418,7 @@ def test_a_service_that_goes_away_mid_stream_is_a_clear_error(connect: Callable[
         wire.send(answer(wire.frames_of(3)[0]))
         wire.cut()
 
-    with service(script) as url, connect(url) as session:
+    with service(script) as url, connect(url, resume=False) as session:
         for _ in range(3):
             session.send(POSE)
         assert session.recv().seq == 0
@@ -434,7 +435,7 @@ def test_a_restart_is_told_with_its_code(connect: Callable[..., Any]) -> None:
 
     with (
         service(script) as url,
-        connect(url) as session,
+        connect(url, resume=False) as session,
         pytest.raises(fervor_client.Unreachable, match=r"code 1012, restart\); 1 frame has no answer"),
     ):
         session.estimate(POSE)
@@ -461,7 +462,7 @@ def test_leaving_a_session_that_is_lost_raises_nothing_of_its_own(connect: Calla
         wire.open()
         wire.frames_of(1)
 
-    with service(script) as url, connect(url) as session:
+    with service(script) as url, connect(url, resume=False) as session:
         session.send(POSE)
 
 

@@ -12,17 +12,19 @@
     asyncio.run(main())
 
 `connect` and `Session` are for asyncio; `fervor_client.sync` has the same names for threads, without the `await`.
+A cut is mended by the session itself: it connects again, resumes from the service's checkpoints, sends again what was
+under way, and hands out every estimate once.
 """
 
-from fervor.errors import AuthError, FervorError, FrameError, InputError, Overloaded, ProtocolError
+from fervor.errors import AuthError, FervorError, FrameError, InputError, Overloaded, ProtocolError, Unreachable
 from fervor.levels import Level
 from fervor.protocol.messages import Estimate, SessionCalibrated, Totals
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor_client import sync
 from fervor_client.address import DEFAULT_URL
 from fervor_client.aio import Session, connect
-from fervor_client.failures import Unreachable
 from fervor_client.options import Options
+from fervor_client.retrying import Reconnect
 
 __all__ = [
     "DEFAULT_URL",
@@ -35,6 +37,7 @@ __all__ = [
     "Options",
     "Overloaded",
     "ProtocolError",
+    "Reconnect",
     "Session",
     "SessionCalibrated",
     "SkeletonSpec",

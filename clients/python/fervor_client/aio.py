@@ -3,51 +3,40 @@
 import asyncio
 import logging
 import ssl as tls
+import time
 from collections.abc import Generator, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Self, Unpack
-
-from websockets.asyncio.client import ClientConnection
-from websockets.asyncio.client import connect as open_socket
-from websockets.exceptions import ConnectionClosed, WebSocketException
-from websockets.typing import Subprotocol
+from typing import Self, Unpack
 
 from fervor.errors import FervorError
 from fervor.protocol.messages import Estimate, SessionCalibrated, Totals
 from fervor.protocol.skeleton_spec import SkeletonSpec
-from fervor_client.address import DEFAULT_URL, stream_url, without_secrets
-from fervor_client.base import CLOSE_TIMEOUT_S, WINDOW, BaseSession, OnError, log_error
-from fervor_client.conversation import Conversation, Key, State
-from fervor_client.failures import SUBPROTOCOL, Unreachable, check_subprotocol, closed, refused
+from fervor_client.address import DEFAULT_URL
+from fervor_client.aio_connection import Connected
+from fervor_client.answers import Key
+from fervor_client.base import RETRY_FOR_S, WINDOW, OnError, OnReconnect, log_error, log_reconnect
+from fervor_client.conversation import Conversation
+from fervor_client.dialling import Way
 from fervor_client.options import Held, Options, calibration, opening
 from fervor_client.poses import Pose
+from fervor_client.retrying import Retries
+from fervor_client.standing import State
 
 logger = logging.getLogger("fervor_client")
 
 
-class Session(BaseSession):
+class Session(Connected):
     """A live session: poses in, estimates out. `connect` makes it.
 
     Every frame is answered by one estimate. `estimate` sends a pose and waits for its answer; `send` does not wait,
     the answers are read by `recv` or by `async for`. Poses may be sent and estimates read from several tasks.
 
     Errors. A frame that the service refuses harms nothing else: its `estimate` raises, and for frames that were sent
-    by `send` the error goes to `on_error`. Where the session itself is lost, everything raises: `send` and `estimate`
-    at once, `recv` and the iteration after the last estimate that came.
+    by `send` the error goes to `on_error`. A cut is mended behind the scenes: frames are taken and answers awaited as
+    if nothing had happened, once `window` frames are under way sending waits, and every frame is answered once. Where
+    the session itself is lost, everything raises: `send` and `estimate` at once, `recv` and the iteration after the
+    last estimate that came.
     """
-
-    def __init__(
-        self,
-        socket: ClientConnection,
-        conversation: Conversation,
-        *,
-        window: int = WINDOW,
-        on_error: OnError = log_error,
-    ) -> None:
-        super().__init__(conversation, window=window, on_error=on_error)
-        self._socket = socket
-        self._news = asyncio.Condition()
-        self._reader: asyncio.Task[None] | None = None
 
     async def send(
         self,
@@ -138,11 +127,13 @@ class Session(BaseSession):
 
     async def reset_body(self, body: str = "0") -> None:
         """Forget what a body did so far; its next pose is a first one."""
-        await self._write(self._conversation.reset_body(body))
+        self._conversation.reset_body(body)
+        await self._pump()
 
     async def end_body(self, body: str) -> None:
         """Say that a body is gone, so that the service frees what it keeps of it."""
-        await self._write(self._conversation.end_body(body))
+        self._conversation.end_body(body)
+        await self._pump()
 
     async def calibrate(self, *, timeout: float | None = 30.0, **held: Unpack[Held]) -> SessionCalibrated:  # noqa: ASYNC109
         """Take the alignment of an unknown sensor from a pose that a body holds; another task sends its frames.
@@ -154,7 +145,8 @@ class Session(BaseSession):
             TimeoutError: not enough frames came in time.
             FervorError: the session is lost or has ended.
         """
-        await self._write(self._conversation.calibrate(calibration(held)))
+        self._conversation.calibrate(calibration(held))
+        await self._pump()
         try:
             async with asyncio.timeout(timeout), self._news:
                 while (found := self._conversation.take_calibration()) is None:
@@ -174,7 +166,8 @@ class Session(BaseSession):
             FervorError: the session is lost.
         """
         if self._conversation.state is State.OPEN:
-            await self._write(self._conversation.end())
+            self._conversation.end()
+            await self._pump()
         try:
             async with asyncio.timeout(timeout), self._news:
                 await self._news.wait_for(lambda: self._conversation.over)
@@ -184,13 +177,6 @@ class Session(BaseSession):
             self._conversation.must_be_open()
         assert self._conversation.totals is not None
         return self._conversation.totals
-
-    async def close(self) -> None:
-        """Close the connection now, whatever is under way."""
-        self._conversation.lost(None)
-        await self._socket.close()
-        if self._reader is not None:
-            await asyncio.wait([self._reader])
 
     async def __aenter__(self) -> Self:
         return self
@@ -207,18 +193,6 @@ class Session(BaseSession):
         finally:
             await self.close()
 
-    async def start(self) -> None:
-        """Open the conversation. `connect` does it.
-
-        Raises:
-            FervorError: the service refused.
-        """
-        self._reader = asyncio.create_task(self._read(), name="fervor-client")
-        await self._write(self._conversation.start())
-        async with self._news:
-            await self._news.wait_for(lambda: self._conversation.state is not State.STARTING)
-        self._conversation.must_be_open()
-
     async def _send(
         self,
         pose: Pose,
@@ -233,47 +207,9 @@ class Session(BaseSession):
         if not self._has_room():
             async with self._news:
                 await self._news.wait_for(self._has_room)
-        number, payload = self._conversation.frame(
-            pose, body=body, seq=seq, t=t, emotion=emotion, mask=mask, awaited=awaited
-        )
-        await self._write(payload)
+        number = self._conversation.frame(pose, body=body, seq=seq, t=t, emotion=emotion, mask=mask, awaited=awaited)
+        await self._pump()
         return body, number
-
-    async def _write(self, payload: str | bytes) -> None:
-        try:
-            await self._socket.send(payload)
-        except ConnectionClosed:
-            if self._reader is not None:
-                await asyncio.wait([self._reader])  # it knows why
-            self._conversation.must_be_open()
-
-    async def _read(self) -> None:
-        """Take in what comes until the connection ends; keep it alive while nothing does."""
-        failure: FervorError | None = Unreachable("the client stopped reading")
-        try:
-            while not self._conversation.over:
-                await self._read_one()
-            failure = None
-        except ConnectionClosed as error:
-            failure = closed(error, self._conversation.url, unanswered=self.in_flight)
-        finally:
-            self._conversation.lost(failure)
-            async with self._news:
-                self._news.notify_all()
-        await self._socket.close()
-
-    async def _read_one(self) -> None:
-        try:
-            async with asyncio.timeout(self._quiet_s()):
-                payload = await self._socket.recv()
-        except TimeoutError:
-            await self._socket.send(self._conversation.ping())
-            return
-        async with self._news:
-            errors = self._conversation.receive(payload)
-            self._news.notify_all()
-        for error in errors:
-            self._tell(error)
 
 
 class connect:  # noqa: N801  # called like a function, as in websockets
@@ -286,8 +222,12 @@ class connect:  # noqa: N801  # called like a function, as in websockets
         token: for a service that wants one.
         window: most frames under way; then sending waits.
         on_error: called with recoverable errors that nobody awaits, by default to log them; it must not wait.
+        resume: go on by itself after a cut, as if there had been none; else the first cut ends the session.
+        retry_for: seconds to try for, after which the session is lost; None: for ever.
+        on_reconnect: called when the connection is lost, when an attempt fails, and when the stream goes on, by default
+            to log it; it must not wait.
         ssl: TLS settings for `wss://`; the system's if None.
-        open_timeout: seconds for connecting and starting.
+        open_timeout: seconds for connecting and starting, and for each attempt to reconnect.
         options: see `Options`.
 
     Raises:
@@ -306,56 +246,26 @@ class connect:  # noqa: N801  # called like a function, as in websockets
         token: str | None = None,
         window: int = WINDOW,
         on_error: OnError = log_error,
+        resume: bool = True,
+        retry_for: float | None = RETRY_FOR_S,
+        on_reconnect: OnReconnect = log_reconnect,
         ssl: tls.SSLContext | None = None,
         open_timeout: float = 10.0,
         **options: Unpack[Options],
     ) -> None:
-        self._start = opening(skeleton, emotion, options)
-        self._url = stream_url(url)
-        self._shown = without_secrets(self._url)
-        self._headers = {"Authorization": f"Bearer {token}"} if token else {}
-        self._window = window
-        self._on_error = on_error
-        self._tls: dict[str, Any] = {"ssl": ssl} if ssl else {}
-        self._open_timeout = open_timeout
-        self._session: Session | None = None
+        start = opening(skeleton, emotion, options, resume=resume)
+        way = Way.to(url, token=token, ssl=ssl, timeout_s=open_timeout)
+        retries = Retries(retry_for, now=time.monotonic) if resume else None
+        conversation = Conversation(start, url=way.shown, retries=retries)
+        self._session = Session(way, conversation, window=window, on_error=on_error, on_reconnect=on_reconnect)
 
     def __await__(self) -> Generator[object, None, Session]:
-        return self._open().__await__()
+        return self._session.start().__await__()
 
     async def __aenter__(self) -> Session:
-        self._session = await self._open()
-        return self._session
+        return await self._session.start()
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._session is not None, "__aenter__ came first"
         await self._session.__aexit__(kind, error, trace)
-
-    async def _open(self) -> Session:
-        try:
-            async with asyncio.timeout(self._open_timeout):
-                socket = await open_socket(
-                    self._url,
-                    subprotocols=[Subprotocol(SUBPROTOCOL)],
-                    compression=None,
-                    additional_headers=self._headers,
-                    open_timeout=None,
-                    close_timeout=CLOSE_TIMEOUT_S,
-                    **self._tls,
-                )
-                return await self._begin(socket)
-        except (OSError, EOFError, WebSocketException) as error:
-            raise refused(error, self._shown) from error
-
-    async def _begin(self, socket: ClientConnection) -> Session:
-        conversation = Conversation(self._start, url=self._shown)
-        session = Session(socket, conversation, window=self._window, on_error=self._on_error)
-        try:
-            check_subprotocol(socket.subprotocol, self._shown)
-            await session.start()
-        except BaseException:
-            await session.close()
-            raise
-        return session

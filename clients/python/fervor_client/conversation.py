@@ -2,105 +2,104 @@
 
 Rules: `start` first, then frames · a frame is answered by one estimate or one error that names it · answers are matched
 by (body, seq), in whatever order they come · a recoverable error concerns one message, the conversation goes on · a
-fatal one ends it, and so does the loss of the connection; what was answered before can still be read.
+fatal one ends it; what was answered before can still be read.
 
-    NEW ──start──▶ STARTING ──session.started──▶ OPEN ──end──▶ ENDING ──session.ended──▶ CLOSED
-                       └───────────── fatal error, connection lost, from any state ─────────▲
+A conversation that resumes outlives its connections: `interrupted` says when to open the next one and `start` again.
+Meanwhile it stays OPEN or ENDING, and frames are taken as ever; they leave once there is a connection.
 """
 
 import logging
 import time
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum, auto
 
-from pydantic import ValidationError
-
-from fervor.errors import FervorError, FrameError, InputError, MessageError, ProtocolError
-from fervor.protocol.codec import CODECS, one_sentence
+from fervor.errors import EngineError, FervorError, FrameError, InputError, MessageError, ProtocolError, Unreachable
+from fervor.protocol.codec import CODECS
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
-    ClientMessage,
+    Checkpoint,
     Error,
     Estimate,
     Estimates,
-    Frame,
     Ping,
+    ServerMessage,
     SessionCalibrate,
     SessionCalibrated,
     SessionEnd,
     SessionEnded,
     SessionStart,
     SessionStarted,
-    Totals,
 )
-from fervor_client.failures import SUBPROTOCOL, Unreachable, told
-from fervor_client.options import wire_emotion
-from fervor_client.poses import Pose, to_joints
+from fervor_client.answers import Answers, Key
+from fervor_client.failures import SUBPROTOCOL, told, unknown_type
+from fervor_client.framing import Framer
+from fervor_client.line import Line, Link
+from fervor_client.poses import Pose
+from fervor_client.retrying import Reconnect, Retries
+from fervor_client.standing import Standing, State
 
 logger = logging.getLogger("fervor_client")
 
-UNREAD = 65_536
-"""Estimates kept for a caller who does not read them (half an hour of one body); then the oldest go."""
-
-Key = tuple[str, int]
-"""A frame: its body and seq."""
+News = FervorError | Reconnect
+"""What a caller is told by callbacks: a recoverable error that nobody awaits, or how a reconnect goes."""
 
 
-class State(Enum):
-    """Where a conversation stands."""
-
-    NEW = auto()
-    STARTING = auto()
-    OPEN = auto()
-    ENDING = auto()
-    CLOSED = auto()
-
-
-class Conversation:
+class Conversation(Standing):
     """One session as its client sees it.
 
-    The caller's duties: send every payload in the order in which it was made; hand every message that comes to
-    `receive`; call `lost` when the connection is gone. Calls must not overlap.
+    The caller's duties: send the payload of `start` on each new connection, then whatever `next_payload` gives, in that
+    order; hand every message that comes to `receive`; call `interrupted` when a connection is gone or could not be had,
+    and `lost` when there shall be none. Calls must not overlap.
     """
 
-    def __init__(self, start: SessionStart, *, url: str, now: Callable[[], float] = time.monotonic) -> None:
-        self.state = State.NEW
-        self.url = url
-        self.failure: FervorError | None = None
-        """Why the conversation ended, unless both sides wanted it to."""
+    def __init__(
+        self,
+        start: SessionStart,
+        *,
+        url: str,
+        retries: Retries | None = None,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`retries`: when to try again after a cut; None: the first one ends the conversation."""
+        super().__init__(url)
         self.started: SessionStarted | None = None
-        self.totals: Totals | None = None
-        """What the service counted, once it has said so."""
+        """The newest one: a resume brings another."""
         self._start = start
-        self._now = now
         self._codec = CODECS[SUBPROTOCOL]
-        self._next_seq: dict[str, int] = {}
-        self._width = 4  # numbers a joint had in the newest pose
-        self._unanswered: dict[Key, None] = {}  # in the order sent
-        self._awaited: dict[Key, Estimate | FervorError | None] = {}
-        self._inbox: deque[Estimate] = deque()
-        self._overflowed = False
+        self._framer = Framer(now)
+        self._answers = Answers(latest=start.delivery == "latest")
         self._calibrating = False
         self._calibration: SessionCalibrated | FervorError | None = None
+        self._line = Line(start, retries, now)
+
+    @property
+    def linked(self) -> bool:
+        """Whether there is a connection on which the session goes on."""
+        return self._line.link is Link.UP and not self.over
+
+    @property
+    def linking(self) -> bool:
+        """Whether a new connection waits for its `session.started`."""
+        return self._line.link is Link.STARTING and not self.over
+
+    @property
+    def reconnects(self) -> int:
+        """Times that the session went on on another connection."""
+        return self._line.reconnects
 
     @property
     def in_flight(self) -> int:
         """Frames sent and not yet answered."""
-        return len(self._unanswered)
-
-    @property
-    def over(self) -> bool:
-        """Whether nothing more will come."""
-        return self.state is State.CLOSED
+        return self._answers.in_flight
 
     # --- what to send -------------------------------------------------------------------------------------------------
 
     def start(self) -> str | bytes:
-        """The payload that opens the conversation."""
-        self.state = State.STARTING
-        return self._codec.encode(self._start)
+        """The payload that opens the conversation, or resumes it on a new connection."""
+        if self.started is None:
+            self.state, self._line.link = State.STARTING, Link.STARTING
+            return self._codec.encode(self._start)
+        return self._codec.encode(self._line.resume(self._start, self.started))
 
     def frame(
         self,
@@ -112,107 +111,116 @@ class Conversation:
         emotion: str | Mapping[str, float] | None = None,
         mask: Sequence[bool] | None = None,
         awaited: bool = False,
-    ) -> tuple[int, str | bytes]:
-        """A pose as a frame.
-
-        Args:
-            pose: see `Session.send`.
-            body: whose it is.
-            seq: its number; one more than the body's last if None.
-            t: seconds on the caller's clock; the monotonic clock if None.
-            emotion: a new label or a probability per emotion; the old one holds if None.
-            mask: false where a joint is untracked.
-            awaited: the answer is kept for `take` instead of the inbox.
+    ) -> int:
+        """Take a pose as a frame to send; see `Session.send`. If `awaited`, the answer is kept for `take`.
 
         Returns:
-            The frame's seq, and the payload.
+            The frame's seq.
 
         Raises:
             FrameError: the pose, or one of the others, can't be sent; nothing happened.
             FervorError: the conversation is not open.
         """
         self.must_be_open()
-        seq = self._next_seq.get(body, 0) if seq is None else seq
-        try:
-            joints = to_joints(pose, self._joints, width=self._width)
-            frame = Frame(
-                body=body,
-                seq=seq,
-                t=self._now() if t is None else float(t),
-                **joints,
-                mask=None if mask is None else tuple(bool(seen) for seen in mask),
-                emotion=wire_emotion(emotion),
-            )
-        except ValidationError as error:
-            raise FrameError(one_sentence(error), body=body, seq=seq) from None
-        except FrameError as error:
-            raise FrameError(f"frame {seq} of body {body!r}: {error.message}", body=body, seq=seq) from None
-        self._width = 4 if "q" in joints else 3
-        self._next_seq[body] = max(seq + 1, self._next_seq.get(body, 0))
-        self._unanswered[body, seq] = None
-        if awaited:
-            self._awaited[body, seq] = None
-        return seq, self._codec.encode(frame)
+        frame = self._framer.make(pose, self._joints, body=body, seq=seq, t=t, emotion=emotion, mask=mask)
+        if self._answers.waits((body, frame.seq)):
+            sentence = f"frame {frame.seq} of body {body!r} is under way; expected a seq that rises"
+            raise FrameError(sentence, body=body, seq=frame.seq)
+        frame = self._line.log.remind(frame)
+        payload = self._codec.encode(frame)
+        self._framer.count(frame)
+        self._answers.expect((body, frame.seq), awaited=awaited)
+        self._line.log.add_frame(frame, payload)
+        self._line.post(payload)
+        return frame.seq
 
-    def reset_body(self, body: str) -> str | bytes:
-        """The payload that makes the service forget what `body` did so far."""
-        return self._encode(BodyReset(body=body))
+    def reset_body(self, body: str) -> None:
+        """Make the service forget what `body` did so far."""
+        self.must_be_open()
+        self._answers.count_reset()
+        payload = self._codec.encode(BodyReset(body=body))
+        self._line.log.add_reset(body, payload)
+        self._line.post(payload)
 
-    def end_body(self, body: str) -> str | bytes:
-        """The payload that says `body` is gone."""
-        return self._encode(BodyEnd(body=body))
+    def end_body(self, body: str) -> None:
+        """Say that `body` is gone."""
+        self.must_be_open()
+        payload = self._codec.encode(BodyEnd(body=body))
+        self._line.log.add_end(body, payload)
+        self._line.post(payload)
 
-    def calibrate(self, request: SessionCalibrate) -> str | bytes:
-        """The payload that makes the service take its alignment from the frames that follow."""
-        payload = self._encode(request)
+    def calibrate(self, request: SessionCalibrate) -> None:
+        """Make the service take its alignment from the frames that follow; after a cut it is asked again."""
+        self.must_be_open()
+        payload = self._codec.encode(request)
+        self._line.log.add_calibrate(payload)
+        self._line.post(payload)
         self._calibrating, self._calibration = True, None
-        return payload
 
     def ping(self) -> str | bytes:
-        """A payload that says no more than that we are here."""
+        """A payload that says no more than that we are here; not in the queue of the others."""
         return self._codec.encode(Ping())
 
-    def end(self) -> str | bytes:
-        """The payload that ends the conversation; answers under way still come."""
-        payload = self._encode(SessionEnd())
+    def end(self) -> None:
+        """End the conversation; answers under way still come."""
+        self.must_be_open()
+        self._line.post(self._codec.encode(SessionEnd()))
         self.state = State.ENDING
-        return payload
+
+    def next_payload(self) -> str | bytes | None:
+        """What to send next on this connection, if anything; wait `pause_s` first."""
+        return self._line.next_payload()
+
+    @property
+    def pause_s(self) -> float:
+        """Seconds to wait before the next payload, while a backlog leaves that the service would find too fast."""
+        return self._line.pause_s
 
     # --- what comes ---------------------------------------------------------------------------------------------------
 
-    def receive(self, payload: str | bytes) -> list[FervorError]:
+    def receive(self, payload: str | bytes) -> list[News]:
         """Take in a message.
 
         Returns:
-            Recoverable errors that nobody awaits.
+            Recoverable errors that nobody awaits, and that the stream goes on after a cut.
         """
-        if self.over:
-            return []
-        try:
-            message = self._codec.decode_server(payload)
-        except MessageError as error:
-            self.lost(ProtocolError(f"the service at {self.url} sent what this client can't read: {error.message}"))
-            return []
+        message = None if self.over else self._read(payload)
         match message:
             case SessionStarted():
-                self.started, self.state = message, State.OPEN
+                return self._opened(message)
             case Estimate():
                 self._answered(message)
             case Estimates():
-                for estimate in message.estimates:
-                    self._answered(estimate)
+                self._answered(*message.estimates)
+            case Checkpoint():
+                self._line.log.checkpoint(message)
             case Error():
                 return self._refused(message)
             case SessionCalibrated():
-                self._calibrating, self._calibration = False, message
+                self._calibrated(message)
             case SessionEnded():
-                self.totals, self.state = message.totals, State.CLOSED
+                self.ended(self._answers.totals if self.reconnects else message.totals)
         return []
 
-    def lost(self, failure: FervorError | None) -> None:
-        """The conversation is over; `failure` says why, None that it was meant to be."""
-        if not self.over:
-            self.state, self.failure = State.CLOSED, failure
+    def interrupted(self, failure: FervorError) -> Reconnect | None:
+        """The connection is gone, or there could be none; `failure` is why, unless the service told it.
+
+        Returns:
+            When to open another one and `start` again; None: never, the conversation is over.
+        """
+        reason = self._line.cut(failure)
+        if self.over:
+            return None
+        if not self._line.resumes or self.state in (State.NEW, State.STARTING):
+            self.lost(reason)
+            return None
+        if self.state is State.ENDING and not self.in_flight:  # only the goodbye is missing
+            self.ended(self._answers.totals)
+            return None
+        news = self._line.again(reason)
+        if news is None:
+            self.lost(self._line.surrender())
+        return news
 
     # --- what came ----------------------------------------------------------------------------------------------------
 
@@ -222,11 +230,10 @@ class Conversation:
         Raises:
             FervorError: the conversation failed, and all that came before is read.
         """
-        if self._inbox:
-            return self._inbox.popleft()
-        if self.failure is not None:
+        estimate = self._answers.next()
+        if estimate is None and self.failure is not None:
             raise self.failure
-        return None
+        return estimate
 
     def take(self, key: Key) -> Estimate | None:
         """The answer to an awaited frame; None if it has not come.
@@ -234,9 +241,7 @@ class Conversation:
         Raises:
             FervorError: the service refused the frame, or the conversation is over.
         """
-        answer = self._awaited.get(key)
-        if isinstance(answer, FervorError):
-            raise answer
+        answer = self._answers.take(key)
         if answer is None and self.over:
             raise self.failure or Unreachable(f"the session with {self.url} ended before frame {key[1]} was answered")
         return answer
@@ -256,63 +261,70 @@ class Conversation:
 
     def give_up(self, key: Key) -> None:
         """Nobody awaits this frame any more."""
-        self._awaited.pop(key, None)
+        self._answers.give_up(key)
 
-    def must_be_open(self) -> None:
-        """Raise why nothing can be sent, unless something can."""
-        if self.state is State.OPEN:
-            return
-        if self.failure is not None:
-            raise self.failure
-        what = "has not started" if self.state in (State.NEW, State.STARTING) else "has ended; connect again"
-        raise Unreachable(f"the session with {self.url} {what}")
+    def _read(self, payload: str | bytes) -> ServerMessage | None:
+        """The message; None if a newer service says what this client does not know, or nothing that makes sense."""
+        try:
+            return self._codec.decode_server(payload)
+        except MessageError as error:
+            if (kind := unknown_type(payload)) is not None:
+                logger.debug("skipped a message of the unknown type %r", kind)
+            else:
+                self.lost(ProtocolError(f"the service at {self.url} sent what this client can't read: {error.message}"))
+        return None
 
     @property
     def _joints(self) -> tuple[str, ...]:
         assert self.started is not None, "only an open conversation sends frames"
         return self.started.joints
 
-    def _encode(self, message: ClientMessage) -> str | bytes:
-        self.must_be_open()
-        return self._codec.encode(message)
+    def _opened(self, message: SessionStarted) -> list[News]:
+        again, self.started = self.started is not None, message
+        self._line.log.idle_s = message.limits.body_idle_s
+        if not again:
+            self.state, self._line.link = State.OPEN, Link.UP
+            return []
+        news, echoes = self._line.resumed(message)
+        self._answers.expect_again(echoes)
+        if self.state is State.ENDING:
+            self._line.post(self._codec.encode(SessionEnd()))
+        return [news]
 
-    def _answered(self, estimate: Estimate) -> None:
-        key = (estimate.body, estimate.seq)
-        for frame in self._settled(key):
-            self._unanswered.pop(frame, None)
-            if frame in self._awaited:
-                self._awaited[frame] = estimate
-        if key not in self._awaited:
-            self._keep(estimate)
+    def _answered(self, *estimates: Estimate) -> None:
+        for estimate in estimates:
+            key = (estimate.body, estimate.seq)
+            if self._answers.waits(key) and self._line.log.begins_anew(estimate.body) and "reset" not in estimate.flags:
+                estimate = estimate.model_copy(update={"flags": ("reset", *estimate.flags)})  # noqa: PLW2901
+            settled = self._answers.settle(estimate)
+            if settled:
+                self._line.log.answered(settled)
+                self._line.progress()
 
-    def _settled(self, key: Key) -> list[Key]:
-        """The frames that an estimate answers: its own, and those that delivery `latest` skipped for it."""
-        if self._start.delivery == "every":
-            return [key]
-        body, seq = key
-        return [frame for frame in self._unanswered if frame[0] == body and frame[1] <= seq]
+    def _calibrated(self, message: SessionCalibrated) -> None:
+        """From here on a resume must ask for the new alignment, under the name that the service goes on using."""
+        asked = self._start.skeleton
+        name = asked if isinstance(asked, str) else asked.name
+        self._start = self._start.model_copy(update={"skeleton": message.skeleton.model_copy(update={"name": name})})
+        self._line.log.calibrated()
+        self._calibrating, self._calibration = False, message
 
-    def _keep(self, estimate: Estimate) -> None:
-        self._inbox.append(estimate)
-        if len(self._inbox) <= UNREAD:
-            return
-        self._inbox.popleft()
-        if not self._overflowed:
-            logger.warning("%d estimates are unread; from now on the oldest are dropped", UNREAD)
-        self._overflowed = True
-
-    def _refused(self, message: Error) -> list[FervorError]:
+    def _refused(self, message: Error) -> list[News]:
         error = told(message)
         if message.fatal:
-            self.lost(error)
+            self._line.fault, self._line.link = error, Link.DOWN
+            if not self._line.resumes or self.started is None:
+                self.lost(error)
             return []
-        key = None if message.body is None or message.seq is None else (message.body, message.seq)
-        if key is not None:
-            self._unanswered.pop(key, None)
-        if key is not None and key in self._awaited:
-            self._awaited[key] = error
-        elif self._calibrating and type(error) is InputError and key is None:
+        if message.body is not None and message.seq is not None:
+            key = (message.body, message.seq)
+            awaited = self._answers.refuse(key, error)
+            if awaited is not None:
+                self._line.log.refused(key, forget=not isinstance(error, EngineError))
+                self._line.progress()
+            return [error] if awaited is False else []
+        if self._calibrating and type(error) is InputError:
             self._calibrating, self._calibration = False, error
-        else:
-            return [error]
-        return []
+            self._line.log.calibration_failed()
+            return []
+        return [error]

@@ -8,6 +8,7 @@ import ssl
 from collections.abc import Mapping
 from errno import ECONNREFUSED
 from socket import gaierror
+from typing import get_args
 
 from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus, InvalidURI
 
@@ -28,22 +29,16 @@ from fervor.errors import (
     RequestError,
     StartTimeout,
     TooLarge,
+    Unreachable,
 )
-from fervor.protocol.messages import PROTOCOL, Error
+from fervor.protocol.messages import PROTOCOL, Error, ServerMessage
 from fervor_client.address import STREAM_PATH
 
 SUBPROTOCOL = f"{PROTOCOL}.json"
 """What this client speaks."""
 
 
-class Unreachable(FervorError):
-    """No service answers at the address, or it went away."""
-
-    code = "unreachable"
-    http_status = 502
-    close_code = None
-    exit_code = 69
-
+_KNOWN_TYPES = frozenset(kind.model_fields["type"].default for kind in get_args(get_args(ServerMessage)[0]))
 
 _BY_CODE: Mapping[str, type[FervorError]] = {
     kind.code: kind
@@ -119,6 +114,16 @@ def closed(error: ConnectionClosed | None, url: str, *, unanswered: int) -> Ferv
     frames = f"; {unanswered} frame{'s have' if unanswered > 1 else ' has'} no answer" if unanswered else ""
     kind = _BY_CLOSE_CODE.get(close.code, Unreachable) if close else Unreachable
     return kind(f"the service at {url} closed the connection ({cause}){frames}")
+
+
+def unknown_type(payload: str | bytes) -> str | None:
+    """The type of a message that this client does not know, and a newer service may say; None if it is none."""
+    try:
+        message = json.loads(payload)
+    except ValueError:
+        return None
+    kind = message.get("type") if isinstance(message, dict) else None
+    return kind if isinstance(kind, str) and kind not in _KNOWN_TYPES else None
 
 
 def check_subprotocol(chosen: str | None, url: str) -> None:

@@ -34,6 +34,8 @@ class Options(TypedDict, total=False):
     """Seconds a label holds; default: for ever, probabilities 2 s."""
     by_emotion: bool
     """Estimates carry the intensity under every emotion too."""
+    checkpoint_s: float
+    """Seconds between the checkpoints of a body, client clock; 1 where a session resumes, else none come."""
 
 
 class Held(TypedDict, total=False):
@@ -64,14 +66,25 @@ def calibration(held: Held) -> SessionCalibrate:
         raise InputError(one_sentence(error)) from None
 
 
-def opening(skeleton: str | SkeletonSpec, emotion: str | Mapping[str, float] | None, options: Options) -> SessionStart:
-    """The `session.start` for what a caller asks.
+CHECKPOINT_S = 1.0
+"""Default of `checkpoint_s` where a session resumes."""
+
+
+def opening(
+    skeleton: str | SkeletonSpec,
+    emotion: str | Mapping[str, float] | None,
+    options: Options,
+    *,
+    resume: bool = False,
+) -> SessionStart:
+    """The `session.start` for what a caller asks; one that can `resume` asks for checkpoints.
 
     Raises:
         InputError: an option that the protocol doesn't have, or an impossible value.
     """
+    asked = {"skeleton": skeleton, "emotion": wire_emotion(emotion), "checkpoint_s": CHECKPOINT_S if resume else None}
     try:
-        return SessionStart.model_validate({"skeleton": skeleton, "emotion": wire_emotion(emotion), **options})
+        return SessionStart.model_validate({**asked, **options})
     except ValidationError as error:
         raise InputError(one_sentence(error)) from None
 

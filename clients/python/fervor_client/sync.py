@@ -1,52 +1,36 @@
 """The client for threads: `connect` and `Session`, the twins of those for asyncio."""
 
-import contextlib
 import logging
 import ssl as tls
-import threading
+import time
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Self, Unpack
 
-from websockets.exceptions import ConnectionClosed, WebSocketException
-from websockets.sync.client import ClientConnection
-from websockets.sync.client import connect as open_socket
-from websockets.typing import Subprotocol
-
 from fervor.errors import FervorError
 from fervor.protocol.messages import Estimate, SessionCalibrated, Totals
 from fervor.protocol.skeleton_spec import SkeletonSpec
-from fervor_client.address import DEFAULT_URL, stream_url, without_secrets
-from fervor_client.base import CLOSE_TIMEOUT_S, WINDOW, BaseSession, OnError, log_error
-from fervor_client.conversation import Conversation, Key, State
-from fervor_client.failures import SUBPROTOCOL, Unreachable, check_subprotocol, closed, refused
+from fervor_client.address import DEFAULT_URL
+from fervor_client.answers import Key
+from fervor_client.base import RETRY_FOR_S, WINDOW, OnError, OnReconnect, log_error, log_reconnect
+from fervor_client.conversation import Conversation
+from fervor_client.dialling import Way
 from fervor_client.options import Held, Options, calibration, opening
 from fervor_client.poses import Pose
+from fervor_client.retrying import Retries
+from fervor_client.standing import State
+from fervor_client.sync_connection import Connected
 
 logger = logging.getLogger("fervor_client")
 
 
-class Session(BaseSession):
+class Session(Connected):
     """A live session: poses in, estimates out. `connect` makes it; any thread may use it.
 
     Every frame is answered by one estimate. `estimate` sends a pose and waits for its answer; `send` does not wait,
-    the answers are read by `recv` or by iterating. Errors are as in the async `Session`; `on_error` is called from the
-    thread that reads, so it must not wait for the session.
+    the answers are read by `recv` or by iterating. Errors and cuts are as in the async `Session`; `on_error` and
+    `on_reconnect` are called from the thread that reads, so they must not wait for the session.
     """
-
-    def __init__(
-        self,
-        socket: ClientConnection,
-        conversation: Conversation,
-        *,
-        window: int = WINDOW,
-        on_error: OnError = log_error,
-    ) -> None:
-        super().__init__(conversation, window=window, on_error=on_error)
-        self._socket = socket
-        self._sending = threading.Lock()  # payloads leave in the order in which they are made
-        self._news = threading.Condition()  # guards the conversation
-        self._reader = threading.Thread(target=self._read, name="fervor-client", daemon=True)
 
     def send(
         self,
@@ -105,27 +89,24 @@ class Session(BaseSession):
 
     def reset_body(self, body: str = "0") -> None:
         """Forget what a body did so far; its next pose is a first one."""
-        with self._sending:
-            with self._news:
-                payload = self._conversation.reset_body(body)
-            self._write(payload)
+        with self._news:
+            self._conversation.reset_body(body)
+        self._pump()
 
     def end_body(self, body: str) -> None:
         """Say that a body is gone, so that the service frees what it keeps of it."""
-        with self._sending:
-            with self._news:
-                payload = self._conversation.end_body(body)
-            self._write(payload)
+        with self._news:
+            self._conversation.end_body(body)
+        self._pump()
 
     def calibrate(self, *, timeout: float | None = 30.0, **held: Unpack[Held]) -> SessionCalibrated:
         """Take the alignment of an unknown sensor from a held pose; another thread sends its frames.
 
         See the async `Session.calibrate`.
         """
-        with self._sending:
-            with self._news:
-                payload = self._conversation.calibrate(calibration(held))
-            self._write(payload)
+        with self._news:
+            self._conversation.calibrate(calibration(held))
+        self._pump()
         with self._news:
             found = self._news.wait_for(self._conversation.take_calibration, timeout)
         if found is None:
@@ -134,11 +115,10 @@ class Session(BaseSession):
 
     def end(self, *, timeout: float | None = 10.0) -> Totals:
         """Say that no more poses come, and wait until all are answered. See the async `Session.end`."""
-        with self._sending:
-            with self._news:
-                payload = self._conversation.end() if self._conversation.state is State.OPEN else None
-            if payload is not None:
-                self._write(payload)
+        with self._news:
+            if self._conversation.state is State.OPEN:
+                self._conversation.end()
+        self._pump()
         with self._news:
             if not self._news.wait_for(lambda: self._conversation.over, timeout):
                 raise TimeoutError(f"the service did not end the session within {timeout} s")
@@ -146,15 +126,6 @@ class Session(BaseSession):
                 self._conversation.must_be_open()
             assert self._conversation.totals is not None
             return self._conversation.totals
-
-    def close(self) -> None:
-        """Close the connection now, whatever is under way."""
-        with self._news:
-            self._conversation.lost(None)
-            self._news.notify_all()
-        self._socket.close()
-        if self._reader.is_alive() and threading.current_thread() is not self._reader:
-            self._reader.join()
 
     def __enter__(self) -> Self:
         return self
@@ -170,20 +141,6 @@ class Session(BaseSession):
             logger.debug("the session did not end as it should: %s", failure)
         finally:
             self.close()
-
-    def start(self, timeout: float | None) -> None:
-        """Open the conversation. `connect` does it.
-
-        Raises:
-            TimeoutError: the service did not answer in time.
-            FervorError: the service refused.
-        """
-        self._reader.start()
-        self._write(self._conversation.start())
-        with self._news:
-            if not self._news.wait_for(lambda: self._conversation.state is not State.STARTING, timeout):
-                raise TimeoutError
-            self._conversation.must_be_open()
 
     def _next(self, timeout: float | None) -> Estimate:
         def ready() -> Estimate | bool | None:
@@ -207,49 +164,13 @@ class Session(BaseSession):
         mask: Sequence[bool] | None,
         awaited: bool,
     ) -> Key:
-        with self._sending:
-            with self._news:
-                self._news.wait_for(self._has_room)
-                number, payload = self._conversation.frame(
-                    pose, body=body, seq=seq, t=t, emotion=emotion, mask=mask, awaited=awaited
-                )
-            self._write(payload)
-        return body, number
-
-    def _write(self, payload: str | bytes) -> None:
-        try:
-            self._socket.send(payload)
-        except ConnectionClosed:
-            if threading.current_thread() is not self._reader:
-                self._reader.join()  # it knows why
-            self._conversation.must_be_open()
-
-    def _read(self) -> None:
-        """Take in what comes until the connection ends; keep it alive while nothing does."""
-        failure: FervorError | None = Unreachable("the client stopped reading")
-        try:
-            while not self._conversation.over:
-                self._read_one()
-            failure = None
-        except ConnectionClosed as error:
-            failure = closed(error, self._conversation.url, unanswered=self.in_flight)
-        finally:
-            with self._news:
-                self._conversation.lost(failure)
-                self._news.notify_all()
-        self._socket.close()
-
-    def _read_one(self) -> None:
-        try:
-            payload = self._socket.recv(timeout=self._quiet_s())
-        except TimeoutError:
-            self._socket.send(self._conversation.ping())
-            return
         with self._news:
-            errors = self._conversation.receive(payload)
-            self._news.notify_all()
-        for error in errors:
-            self._tell(error)
+            self._news.wait_for(self._has_room)
+            number = self._conversation.frame(
+                pose, body=body, seq=seq, t=t, emotion=emotion, mask=mask, awaited=awaited
+            )
+        self._pump()
+        return body, number
 
 
 def connect(
@@ -260,31 +181,16 @@ def connect(
     token: str | None = None,
     window: int = WINDOW,
     on_error: OnError = log_error,
+    resume: bool = True,
+    retry_for: float | None = RETRY_FOR_S,
+    on_reconnect: OnReconnect = log_reconnect,
     ssl: tls.SSLContext | None = None,
     open_timeout: float = 10.0,
     **options: Unpack[Options],
 ) -> Session:
     """Open a session, to be used in a `with`. Arguments and errors are those of the async `connect`."""
-    start, url = opening(skeleton, emotion, options), stream_url(url)
-    shown = without_secrets(url)
-    headers = {"Authorization": f"Bearer {token}"} if token else {}
-    with contextlib.ExitStack() as undo:
-        try:
-            socket = undo.enter_context(
-                open_socket(
-                    url,
-                    subprotocols=[Subprotocol(SUBPROTOCOL)],
-                    compression=None,
-                    additional_headers=headers,
-                    open_timeout=open_timeout,
-                    close_timeout=CLOSE_TIMEOUT_S,
-                    ssl=ssl,
-                )
-            )
-            check_subprotocol(socket.subprotocol, shown)
-            session = Session(socket, Conversation(start, url=shown), window=window, on_error=on_error)
-            session.start(open_timeout)
-        except (OSError, EOFError, WebSocketException) as error:
-            raise refused(error, shown) from error
-        undo.pop_all()
-    return session
+    start = opening(skeleton, emotion, options, resume=resume)
+    way = Way.to(url, token=token, ssl=ssl, timeout_s=open_timeout)
+    retries = Retries(retry_for, now=time.monotonic) if resume else None
+    conversation = Conversation(start, url=way.shown, retries=retries)
+    return Session(way, conversation, window=window, on_error=on_error, on_reconnect=on_reconnect).start()

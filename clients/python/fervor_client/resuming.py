@@ -1,0 +1,260 @@
+"""What it takes to go on after a cut: per body the newest checkpoint, and every message sent since.
+
+Rules: a message is kept until a checkpoint covers it · what is sent again leaves in the order in which it was first
+sent · a body without a checkpoint goes on too, as long as all its messages are kept · beyond `MOST_KEPT` messages the
+longest log is given up: its body can't be resumed until the next checkpoint, and after a cut begins anew with its
+unanswered frames · a frame is kept until it is answered in any case · a service forgets bodies that fell idle when
+another appears; the same is done here, and repeated in a replay as `body.end`, so that the replay does the same.
+"""
+
+import logging
+from collections.abc import Callable, Iterable
+from math import inf
+
+from fervor.protocol.codec import Codec
+from fervor.protocol.messages import BodyEnd, Checkpoint, Frame, Resumed
+from fervor_client.answers import Key
+from fervor_client.track import Entry, Payload, Track
+
+logger = logging.getLogger("fervor_client")
+
+MOST_KEPT = 4096
+"""Messages kept over all bodies, beside unanswered frames: over a minute of two bodies at 30 Hz, about 8 MB."""
+
+MOST_TOKENS = 64
+TOKEN_SHARE = 0.9
+"""Share of the largest message that the tokens of a `session.start` may take; the newest go first."""
+
+STEP_BACK_S = 1.0
+"""A frame that is older than its body's newest by no more than this is late; by more, the clock was set."""
+
+
+class Log:
+    """What the service may have to be told again."""
+
+    def __init__(
+        self,
+        codec: Codec,
+        *,
+        latest: bool,
+        emotion_ttl_s: float | None,
+        now: Callable[[], float],
+        idles: bool,
+        keeps: bool = True,
+    ) -> None:
+        """`idles`: bodies without frames are forgotten, as under clock `time`; `keeps`: else it stays empty."""
+        self.idle_s = inf
+        """Client time without a frame after which the service may forget a body."""
+        self.anew: set[str] = set()
+        """Bodies that began anew and have no estimate yet."""
+        self._codec = codec
+        self._latest = latest
+        self._ttl_s = emotion_ttl_s
+        self._now = now
+        self._idles = idles
+        self._keeps = keeps
+        self._tracks: dict[str, Track] = {}
+        self._open: dict[Key, Entry] = {}  # frames under way
+        self._calibrate: Entry | None = None
+        self._place = 0
+        self._barrier = -1  # checkpoints of messages up to this place are of terms that no longer hold
+
+    # --- what is sent -------------------------------------------------------------------------------------------------
+
+    def remind(self, frame: Frame) -> Frame:
+        """The frame with the body's label, where it brings none and the service has lost the one in force."""
+        track = self._tracks.get(frame.body)
+        if track is None or not track.unlabelled or frame.emotion is not None:
+            return frame
+        return frame.model_copy(update={"emotion": track.label_at(_time(frame), self._ttl_s)})
+
+    def add_frame(self, frame: Frame, payload: Payload) -> None:
+        """A frame was sent."""
+        if not self._keeps:
+            return
+        track = self._tracks.setdefault(frame.body, Track())
+        self._follow(track, frame)
+        entry = self._append(track, payload, seq=frame.seq)
+        track.unlabelled = False
+        if frame.emotion is not None:
+            entry.label = (frame.emotion, _time(frame))
+        self._open[frame.body, frame.seq] = entry
+        if sum(len(track.entries) for track in self._tracks.values()) > MOST_KEPT + len(self._open):
+            self._give_up_longest()
+
+    def add_reset(self, body: str, payload: Payload) -> None:
+        """A body was reset; nothing to repeat where the service knows none of that name."""
+        track = self._tracks.get(body)
+        if track is not None and track.here:
+            self._append(track, payload)
+
+    def add_end(self, body: str, payload: Payload) -> None:
+        """A body has gone."""
+        track = self._tracks.get(body)
+        if track is not None and track.here:
+            self._end(body, track, payload)
+
+    def add_calibrate(self, payload: Payload) -> None:
+        """A calibration was asked for, in place of any before."""
+        self._calibrate = Entry(self._next_place(), payload)
+
+    # --- what comes ---------------------------------------------------------------------------------------------------
+
+    def answered(self, keys: Iterable[Key]) -> None:
+        """These frames have their estimates."""
+        for key in keys:
+            entry, track = self._open.pop(key, None), self._tracks.get(key[0])
+            if entry is None or track is None:
+                continue
+            track.answered(entry)
+            self._bury(key[0], track)
+
+    def refused(self, key: Key, *, forget: bool) -> None:
+        """A frame was refused; `forget` it unless another try may give an estimate that later ones rest on."""
+        entry, track = self._open.pop(key, None), self._tracks.get(key[0])
+        if entry is None or track is None:
+            return
+        track.refused(entry, forget=forget)
+        self._bury(key[0], track)
+
+    def checkpoint(self, message: Checkpoint) -> None:
+        """A checkpoint covers a body's messages up to its frame `seq`."""
+        track = self._tracks.get(message.body)
+        if track is None:
+            return
+        if not track.token or message.seq != track.seq:
+            covered = next((entry for entry in track.entries if self._covers(message, entry)), None)
+            if covered is None:
+                return
+            track.drop_through(covered)
+        track.token, track.seq, track.since, track.whole = message.token, message.seq, self._now(), True
+        self._bury(message.body, track)
+
+    def begins_anew(self, body: str) -> bool:
+        """Whether the first estimate comes of a body that the service had lost; asked once for each."""
+        begins = body in self.anew
+        self.anew.discard(body)
+        return begins
+
+    def calibrated(self) -> None:
+        """New terms are in force: checkpoints of the old ones are void, and the bodies were reset."""
+        self._calibrate, self._barrier = None, self._place
+        for track in self._tracks.values():
+            track.give_up()
+
+    def calibration_failed(self) -> None:
+        """Nothing came of it."""
+        self._calibrate = None
+
+    # --- going on -----------------------------------------------------------------------------------------------------
+
+    def tokens(self, most_bytes: int) -> tuple[str, ...]:
+        """The checkpoints to resume from; those that find no room in a message are given up."""
+        chosen: list[str] = []
+        left = TOKEN_SHARE * most_bytes
+        for track in sorted(self._tracks.values(), key=lambda track: -track.since):
+            if not track.token:
+                continue
+            left -= len(track.token)
+            if left < 0 or len(chosen) == MOST_TOKENS:
+                track.give_up()
+            else:
+                chosen.append(track.token)
+        return tuple(chosen)
+
+    def refuse_tokens(self, *, older_than: float = inf) -> bool:
+        """The service takes no checkpoints, or none that came before `older_than` (seconds); whether that's any."""
+        refused = [track for track in self._tracks.values() if track.token and track.since < older_than]
+        for track in refused:
+            track.give_up()
+        return bool(refused)
+
+    def resumed(self, bodies: Iterable[Resumed]) -> None:
+        """The service goes on with these bodies only."""
+        known = {(body.body, body.seq) for body in bodies}
+        for name, track in self._tracks.items():
+            if track.token and (name, track.seq) not in known:
+                track.give_up()
+
+    def replay(self) -> tuple[list[Payload], list[Key]]:
+        """What to send again, in order, and which of it are frames that were answered before."""
+        for name in list(self._tracks):
+            self._prepare(name, self._tracks[name])
+        again = [(entry, name) for name, track in self._tracks.items() for entry in track.entries]
+        if self._calibrate is not None:
+            again.append((self._calibrate, ""))
+        again.sort(key=lambda pair: pair[0].place)
+        echoes = [(name, entry.seq) for entry, name in again if entry.seq is not None and entry.answered]
+        return [entry.payload for entry, _ in again], echoes
+
+    def _prepare(self, name: str, track: Track) -> None:
+        """Drop what a service without this body's checkpoint has no use for."""
+        if track.whole and track.token:
+            return
+        if not track.whole:
+            self.anew.add(name)
+        track.begin_anew()
+        if name in self.anew and track.entries:
+            self._remind(track, track.entries[0])
+
+    def _remind(self, track: Track, entry: Entry) -> None:
+        """Let the body's first frame bring the label that was in force before it."""
+        frame = self._codec.decode_client(entry.payload)
+        assert isinstance(frame, Frame), "a body begins with a frame"
+        label = track.label_at(_time(frame), self._ttl_s)
+        if frame.emotion is None and label is not None:
+            entry.payload = self._codec.encode(frame.model_copy(update={"emotion": label}))
+            entry.label = (label, _time(frame))
+
+    # --- bookkeeping --------------------------------------------------------------------------------------------------
+
+    def _covers(self, message: Checkpoint, entry: Entry) -> bool:
+        return entry.seq == message.seq and entry.place > self._barrier and (entry.answered or self._latest)
+
+    def _next_place(self) -> int:
+        self._place += 1
+        return self._place
+
+    def _append(self, track: Track, payload: Payload, *, seq: int | None = None) -> Entry:
+        entry = Entry(self._next_place(), payload, seq)
+        track.entries.append(entry)
+        return entry
+
+    def _follow(self, track: Track, frame: Frame) -> None:
+        """Note where a body stands, and which others the service forgets for it.
+
+        A frame that is refused later counts here too: only if it is the first of a body that was away, and the stream
+        is then cut before the next, can a flag `gap_reset` differ.
+        """
+        time = _time(frame)
+        back = track.here and self._idles and time - track.last > self.idle_s
+        if back:
+            track.newest, track.last = -1, -inf
+        if self._idles and (back or not track.here):
+            for name, other in list(self._tracks.items()):
+                if other is not track and other.here and time - other.last > self.idle_s:
+                    self._end(name, other, self._codec.encode(BodyEnd(body=name)))
+        track.here = True
+        if frame.seq > track.newest and not 0.0 <= track.last - time <= STEP_BACK_S:
+            track.last = time
+        track.newest = max(track.newest, frame.seq)
+
+    def _end(self, name: str, track: Track, payload: Payload) -> None:
+        track.end(self._append(track, payload))
+        self._bury(name, track)
+
+    def _bury(self, name: str, track: Track) -> None:
+        track.bury()
+        if not track.entries and not track.here and not track.token and not track.unlabelled:
+            self._tracks.pop(name, None)
+
+    def _give_up_longest(self) -> None:
+        whole = [item for item in self._tracks.items() if item[1].whole]
+        if whole:
+            name, track = max(whole, key=lambda item: len(item[1].entries))
+            logger.warning("no checkpoint of body %r in %d messages; a cut would start it anew", name, MOST_KEPT)
+            track.give_up()
+
+
+def _time(frame: Frame) -> float:
+    return float(frame.seq) if frame.t is None else frame.t
