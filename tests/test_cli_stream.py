@@ -136,9 +136,9 @@ def test_a_service_that_goes_away_is_one_sentence(start_service, wave: Path) -> 
         assert program.stdout is not None
         program.stdout.readline()
         service.stop()
-        _, said = program.communicate(timeout=20)
+        _, said = program.communicate(timeout=60)
     assert program.returncode == 69
-    assert re.fullmatch(r"fervor: the service at ws://\S+ closed the connection \(code 1012.*\n", said)
+    assert re.fullmatch(r"fervor: .* tried to reconnect \d+ times.*", said.splitlines()[-1])
 
 
 def test_a_terminal_gets_a_meter_that_moves(live: Live, wave: Path) -> None:

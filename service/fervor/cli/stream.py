@@ -17,6 +17,10 @@ from fervor.cli.screens import Complaints, pick_screen, say
 from fervor.protocol.messages import Clock, Memory
 
 
+RETRY_S = 10.0
+"""How long a service that went away may take to come back, seconds."""
+
+
 def stream(
     file: Annotated[Path, typer.Argument(help="A recording: BVH, MVNX, CSV, JSONL or NPZ.", show_default=False)],
     *,
@@ -48,7 +52,13 @@ def stream(
 
     async def run(address: str) -> None:
         async with fervor_client.connect(
-            address, emotion=emotion, token=token, clock=clock, memory=memory, on_error=Complaints()
+            address,
+            emotion=emotion,
+            token=token,
+            clock=clock,
+            memory=memory,
+            on_error=Complaints(),
+            retry_for=RETRY_S,
         ) as session:
             duration = None if loop else take.duration_s
             with pick_screen(take.name, session.model, duration_s=duration, json=json) as screen:

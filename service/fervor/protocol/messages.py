@@ -230,8 +230,8 @@ class Estimate(_Answer):
     )
     level: Level | None
     emotion: str = Field(description="the label in force, or `unknown`")
-    status: Status
-    flags: tuple[Flag, ...] = ()
+    status: Status | str  # a newer service may know more of both
+    flags: tuple[Flag | str, ...] = ()
     by_emotion: Mapping[str, float] | None = None
 
 

@@ -227,6 +227,8 @@ class Session:
     def _checkpoint(self, ticket: Ticket, body: Body, outcome: Outcome) -> list[Event]:
         if ticket.checkpoint is None or outcome.memory is None or self._host.seal is None:
             return []
+        if ticket.source != self._agreed.terms.source:
+            return []  # a calibration came between: this state belongs to terms that no longer hold
         token = self._host.seal(pack(self._bond, body.bookkeeping(ticket), outcome.memory))
         return [Reply(Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=token))]
 
