@@ -238,13 +238,18 @@ def test_cli_describes_every_command_and_option() -> None:
             assert all(option in settings for parameter in command.params for option in parameter.opts)
             continue
         rows = table(section("reference/cli.md", f"## `fervor {name}`"))
-        expected = [
-            [f"`{parameter.opts[-1]}`" if parameter.opts[0].startswith("-") else f"`{parameter.name}`"]
-            for parameter in command.params
+        parameters = [
+            parameter
+            for part in getattr(command, "commands", {name: command}).values()  # a group's are those of its parts
+            for parameter in part.params
             if parameter.name != "help"
         ]
+        expected = [
+            [f"`{parameter.opts[-1]}`" if parameter.opts[0].startswith("-") else f"`{parameter.name}`"]
+            for parameter in parameters
+        ]
         compare(sorted(rows), sorted(expected), name)
-        for parameter in command.params:
+        for parameter in parameters:
             if isinstance(parameter.default, int | float | str | Path) and not isinstance(parameter.default, bool):
                 row = next(row for row in rows if row[0] == f"`{parameter.opts[-1]}`")
                 assert row[1] == f"`{parameter.default}`", (name, parameter.name, parameter.default)

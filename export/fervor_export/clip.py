@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,13 @@ from fervor.skeletons.rig import JOINTS
 
 RATE_HZ = 30.0
 """Frames a second of every clip."""
+
+
+class Phase(NamedTuple):
+    """Motion at 30 Hz that begins a fraction of a frame after a clip's."""
+
+    rotations: npt.NDArray[np.float32]  # [frame, 13, 4] xyzw
+    mask: npt.NDArray[np.bool_]  # [frame, 13]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +44,8 @@ class Clip:
     """Which recording: copies of one recording share it."""
     observers: int | None = None
     """How many people the intensity is a share of; None where unknown."""
+    phases: tuple[Phase, ...] = field(default=(), repr=False)
+    """The recording's other phases, where it is fast enough to have some; `data.augment` makes clips of them."""
 
     def __post_init__(self) -> None:
         if self.rotations.ndim != 3 or self.rotations.shape[1:] != (len(JOINTS), 4) or not len(self.rotations):
