@@ -1,0 +1,1 @@
+"""How well intensities are estimated, measured so that a reviewer would believe it."""
