@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from fervor.errors import ModelFileError
 from fervor.model import Model, check_row_independence
 from fervor_export import commands
+from fervor_export.checkpoint import load_checkpoint
 from networks import DEFAULT
 
 
@@ -39,7 +40,7 @@ def run(tmp_path_factory):
 def test_what_a_run_leaves(run):
     directory, output = run
     assert {path.name for path in directory.iterdir()} == {
-        "config.json", "metrics.json", "checkpoint.pt", "model.onnx", "model_card.md",
+        "config.json", "metrics.json", "checkpoint.pt", "model.onnx", "model_card.md", "learned_from.json",
     }  # fmt: skip
     assert "epoch   1" in output
     assert f"{directory}: epoch 1 of 1" in output.replace("\n", "")
@@ -83,6 +84,17 @@ def test_export_of_a_checkpoint(run, tmp_path):
     mine, first = Model.load(out), Model.load(run[0] / "model.onnx")
     assert (mine.metadata.name, mine.metadata.version, mine.metadata.purpose) == ("mine", "3", "demo")
     assert mine.metadata.training == first.metadata.training
+
+
+def test_a_refused_model_file_costs_no_training(tmp_path, monkeypatch):
+    def refuse(*_):
+        raise ModelFileError("refused")
+
+    monkeypatch.setattr("fervor_export.run.export_model", refuse)
+    with pytest.raises(ModelFileError, match="refused"):
+        invoke("train", "--clips", "60", "--epochs", "1", "--threads", "1", "--out", str(tmp_path))
+    assert {path.name for path in tmp_path.iterdir()} == {"checkpoint.pt", "config.json", "metrics.json"}
+    assert load_checkpoint(tmp_path / "checkpoint.pt").purpose == "demo"
 
 
 def test_errors_are_ours_to_tell(tmp_path):

@@ -18,10 +18,10 @@ def train(  # noqa: PLR0917  # typer calls it by name
     data: Annotated[Literal["synthetic"], typer.Option(help="What to learn from.")] = "synthetic",
     recipe: Annotated[Literal["default", "paper"], typer.Option(help="How to learn.")] = "default",
     seed: Annotated[int, typer.Option(help="Of data, weights, order and augmentation.")] = 0,
-    clips: Annotated[int, typer.Option(min=20, help="How many clips to synthesise.")] = 10000,
+    clips: Annotated[int, typer.Option(min=20, help="How many clips to synthesise.")] = 12000,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead of the recipe's.")] = None,
     minutes: Annotated[float | None, typer.Option(min=0, help="Stop after the epoch that reaches this.")] = None,
-    threads: Annotated[int, typer.Option(min=1, help="Of torch; results repeat for the same number.")] = 2,
+    threads: Annotated[int, typer.Option(min=1, help="Of torch; more help only where cores are idle.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Run directory.", show_default="runs/<data>-<recipe>-<seed>")] = None,
 ) -> None:
     """Train a network; leaves checkpoint, model file, model card and figures in a run directory."""

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from fervor.metadata import TrainingData
 from fervor_export.checkpoint import TrainedNetwork, save_checkpoint
 from fervor_export.clip import Clip, digest
+from fervor_export.evaluation.held_out import write_learned_from
 from fervor_export.export import describe, export_model, library_versions
 from fervor_export.model_card import model_card
 from fervor_export.prediction import fit, predict
@@ -36,23 +37,26 @@ class Run:
     def write(self, directory: Path) -> TrainedNetwork:
         """Write the directory; files of an earlier run in it are replaced.
 
+        The checkpoint comes first: a model file that is refused costs no training.
+
         Raises:
             ModelFileError: the model file does not compute what the network does.
         """
         trained = self.trained()
-        metadata = describe(trained, name=f"fervor-{trained.purpose}", version="0.1.0", purpose=trained.purpose)
-        report = export_model(trained.network, metadata, directory / "model.onnx")
         save_checkpoint(trained, directory / "checkpoint.pt")
+        write_learned_from(self.clips, directory)
         _write_json(directory / "config.json", self._config())
         metrics = {
             "scores": trained.scores,
             "best_epoch": self.result.best.number,
             "stopped": self.result.stopped,
             "levels": trained.levels.model_dump(),
-            "parity": asdict(report),
             "history": [asdict(epoch) for epoch in self.result.history],
         }
         _write_json(directory / "metrics.json", metrics)
+        metadata = describe(trained, name=f"fervor-{trained.purpose}", version="0.1.0", purpose=trained.purpose)
+        report = export_model(trained.network, metadata, directory / "model.onnx")
+        _write_json(directory / "metrics.json", metrics | {"parity": asdict(report)})
         (directory / "model_card.md").write_text(model_card(metadata, command=self.command()), encoding="utf-8")
         return trained
 

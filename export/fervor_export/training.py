@@ -22,8 +22,9 @@ from fervor_export.scores import Scores
 STANDARD_CLIPS = 512
 """How many clips the mean and deviation of features are taken from."""
 
-LEAST_DEVIATION = 0.05
-"""Taken where a feature's is smaller: what never moves in training must not be blown up when it does."""
+LEAST_DEVIATION = 0.2
+"""Taken where a feature's is smaller: what hardly moves in training must not be blown up when it does, nor rounding:
+with 0.05 the folded weights reached 22, and cell states of torch and onnxruntime differed by 2e-5."""
 
 
 @dataclass(frozen=True, slots=True)

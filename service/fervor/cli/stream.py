@@ -16,7 +16,6 @@ from fervor.cli.recordings import read
 from fervor.cli.screens import Complaints, pick_screen, say
 from fervor.protocol.messages import Clock, Memory
 
-
 RETRY_S = 10.0
 """How long a service that went away may take to come back, seconds."""
 
