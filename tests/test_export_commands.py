@@ -7,7 +7,8 @@ import torch
 import typer
 from typer.testing import CliRunner
 
-from fervor.errors import ModelFileError
+from datasets import motion, write_npz
+from fervor.errors import DataError, ModelFileError
 from fervor.model import Model, check_row_independence
 from fervor_export import commands
 from fervor_export.checkpoint import load_checkpoint
@@ -93,7 +94,12 @@ def test_a_refused_model_file_costs_no_training(tmp_path, monkeypatch):
     monkeypatch.setattr("fervor_export.run.export_model", refuse)
     with pytest.raises(ModelFileError, match="refused"):
         invoke("train", "--clips", "60", "--epochs", "1", "--threads", "1", "--out", str(tmp_path))
-    assert {path.name for path in tmp_path.iterdir()} == {"checkpoint.pt", "config.json", "metrics.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "checkpoint.pt",
+        "config.json",
+        "metrics.json",
+        "learned_from.json",
+    }
     assert load_checkpoint(tmp_path / "checkpoint.pt").purpose == "demo"
 
 
@@ -103,5 +109,30 @@ def test_errors_are_ours_to_tell(tmp_path):
 
 
 def test_unknown_choices_are_refused():
-    for arguments in (("train", "--recipe", "mine"), ("train", "--data", "ebmdb9"), ("train", "--clips", "1")):
+    for arguments in (("train", "--recipe", "mine"), ("train", "--clips", "1")):
         assert invoke(*arguments).exit_code == 2
+
+
+@pytest.mark.parametrize("recipe", ["default", "paper"])
+def test_a_data_set_of_ones_own(tmp_path, recipe):
+    rows = ["file,emotion,intensity,actor"]
+    for number in range(12):
+        share = number / 12
+        write_npz(tmp_path / f"take{number}.npz", motion("joy", share=share, seed=number, rate_hz=60.0))
+        rows.append(f"take{number}.npz,joy,{share:.2f},actor {number % 4}")
+    (tmp_path / "manifest.csv").write_text("\n".join(rows) + "\n")
+    out = tmp_path / "run"
+    done = invoke(
+        "train", "--data", str(tmp_path / "manifest.csv"), "--recipe", recipe, "--epochs", "1", "--out", str(out)
+    )
+    assert done.exit_code == 0, done.output
+    model = Model.load(out / "model.onnx")
+    assert (model.metadata.name, model.metadata.purpose) == ("fervor-research", "research")
+    assert 3 <= model.metadata.training.recordings < 12  # the test actors are not among them
+    learned = json.loads((out / "learned_from.json").read_text())
+    assert len(learned["actors"]) == 3
+
+
+def test_a_data_set_that_is_not_there_is_one_sentence():
+    with pytest.raises(DataError, match="ebmdb9"):
+        invoke("train", "--data", "ebmdb9")

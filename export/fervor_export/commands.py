@@ -10,15 +10,12 @@ if TYPE_CHECKING:
     from fervor_export.recipe import Recipe
     from fervor_export.training import TrainingResult
 
-CAST_CLIPS = 1000
-"""Synthetic clips of one cast of actors; more clips have more casts, and the finished network is scored on another."""
-
 
 def train(  # noqa: PLR0917  # typer calls it by name
-    data: Annotated[Literal["synthetic"], typer.Option(help="What to learn from.")] = "synthetic",
+    data: Annotated[str, typer.Option(help="Data set: a folder, a manifest, or `synthetic`.")] = "synthetic",
     recipe: Annotated[Literal["default", "paper"], typer.Option(help="How to learn.")] = "default",
     seed: Annotated[int, typer.Option(help="Of data, weights, order and augmentation.")] = 0,
-    clips: Annotated[int, typer.Option(min=20, help="How many clips to synthesise.")] = 12000,
+    clips: Annotated[int, typer.Option(min=20, help="How many clips to synthesise, for `synthetic`.")] = 12000,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead of the recipe's.")] = None,
     minutes: Annotated[float | None, typer.Option(min=0, help="Stop after the epoch that reaches this.")] = None,
     threads: Annotated[int, typer.Option(min=1, help="Of torch; more help only where cores are idle.")] = 1,
@@ -29,17 +26,20 @@ def train(  # noqa: PLR0917  # typer calls it by name
 
     import torch
 
-    from fervor_export.recipe import RECIPES
+    from fervor_export.data.augment import augment
+    from fervor_export.data.progress import loading_bar
+    from fervor_export.material import gather
+    from fervor_export.recipe import PAPER, RECIPES
     from fervor_export.run import Run
-    from fervor_export.training import split_by_actor
 
     torch.set_num_threads(threads)
     chosen = RECIPES[recipe] if epochs is None else replace(RECIPES[recipe], epochs=epochs)
-    everything, test = _synthetic(clips, seed)
-    learn, validate = split_by_actor(everything, seed=seed)
-    result = _train_visibly(learn, validate, chosen, seed=seed, minutes=minutes)
-    run = Run(data=data, recipe=chosen, seed=seed, threads=threads, clips=everything, test=test, result=result)
-    directory = out or Path("runs") / f"{data}-{recipe}-{seed}"
+    with loading_bar() as told:
+        material = gather(data, clips=clips, seed=seed, progress=told)
+    learn = augment(material.learn) if chosen.name == PAPER.name else material.learn
+    result = _train_visibly(learn, material.validate, chosen, seed=seed, minutes=minutes)
+    run = Run(data=data, material=material, recipe=chosen, seed=seed, threads=threads, result=result)
+    directory = out or Path("runs") / f"{Path(data).stem}-{recipe}-{seed}"
     trained = run.write(directory)
     best, scores = result.best, trained.scores
     typer.echo(
@@ -66,17 +66,6 @@ def export(
     metadata = describe(trained, name=name, version=version, purpose=purpose or trained.purpose)
     report = export_model(trained.network, metadata, out)
     typer.echo(f"{out}: {name} {version}, largest difference to the network {report.largest:.1e} ({report.where})")
-
-
-def _synthetic(clips: int, seed: int) -> "tuple[list[Clip], list[Clip]]":
-    """Clips to train and validate on, and clips of another cast for the test."""
-    from fervor_export.synthetic import synthesise_dataset
-
-    casts = -(-clips // CAST_CLIPS)
-    seeds = range(seed * 1000, seed * 1000 + casts + 1)  # runs with other seeds have other casts
-    sizes = [CAST_CLIPS] * (casts - 1) + [clips - CAST_CLIPS * (casts - 1), min(clips, CAST_CLIPS)]
-    *parts, test = (synthesise_dataset(clips=size, seed=cast) for cast, size in zip(seeds, sizes, strict=True))
-    return [clip for part in parts for clip in part], test
 
 
 def _train_visibly(

@@ -1,23 +1,20 @@
 """A finished training run and the directory it leaves: config, metrics, checkpoint, model file, model card."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from fervor.metadata import TrainingData
 from fervor_export.checkpoint import TrainedNetwork, save_checkpoint
-from fervor_export.clip import Clip, digest
+from fervor_export.clip import digest
 from fervor_export.evaluation.held_out import write_learned_from
 from fervor_export.export import describe, export_model, library_versions
+from fervor_export.material import SYNTHETIC, Material
 from fervor_export.model_card import model_card
 from fervor_export.prediction import fit, predict
 from fervor_export.recipe import Recipe
 from fervor_export.training import TrainingResult
-
-DESCRIPTIONS = {"synthetic": "procedurally generated expressive motion, no recordings of people"}
-"""What a data source is, in the words of the model's metadata."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,13 +22,10 @@ class Run:
     """Everything there is to say about a training run."""
 
     data: str
+    material: Material
     recipe: Recipe
     seed: int
     threads: int
-    clips: Sequence[Clip]
-    """Training and validation clips."""
-    test: Sequence[Clip]
-    """Clips of actors that neither training nor the choice of the epoch has seen."""
     result: TrainingResult
 
     def write(self, directory: Path) -> TrainedNetwork:
@@ -44,7 +38,7 @@ class Run:
         """
         trained = self.trained()
         save_checkpoint(trained, directory / "checkpoint.pt")
-        write_learned_from(self.clips, directory)
+        write_learned_from(self.material.seen, directory)
         _write_json(directory / "config.json", self._config())
         metrics = {
             "scores": trained.scores,
@@ -60,35 +54,31 @@ class Run:
         (directory / "model_card.md").write_text(model_card(metadata, command=self.command()), encoding="utf-8")
         return trained
 
-    @property
-    def purpose(self) -> Literal["demo", "research"]:
-        """A model of generated motion is a demo."""
-        return "demo" if self.data == "synthetic" else "research"
-
     def trained(self) -> TrainedNetwork:
         """The network, scored on the test clips."""
-        network = self.result.network
-        test = fit(self.test, predict(network, self.test, self.recipe))
+        network, material, seen = self.result.network, self.material, self.material.seen
+        test = fit(material.test, predict(network, material.test, self.recipe))
         return TrainedNetwork(
             network=network,
             recipe=self.recipe.name,
             seed=self.seed,
-            purpose=self.purpose,
+            purpose=material.purpose,
             levels=self.result.levels,
             training=TrainingData(
-                description=DESCRIPTIONS[self.data],
-                sha256=digest(self.clips),
-                recordings=len({clip.name for clip in self.clips}),
-                hours=round(sum(clip.seconds for clip in self.clips) / 3600, 2),
+                description=material.description,
+                sha256=digest(seen),
+                recordings=len({clip.name for clip in seen}),
+                hours=round(sum(clip.seconds for clip in seen) / 3600, 2),
             ),
             scores=test.as_dict("test_") | self.result.best.validation.as_dict("validation_"),
         )
 
     def command(self) -> str:
         """What to type to train this network again."""
+        clips = f" --clips {len(self.material.seen)}" if self.data == SYNTHETIC else ""
         return (
-            f"fervor train --data {self.data} --recipe {self.recipe.name} --seed {self.seed} "
-            f"--clips {len(self.clips)} --epochs {self.recipe.epochs} --threads {self.threads}"
+            f"fervor train --data {self.data} --recipe {self.recipe.name} --seed {self.seed}{clips} "
+            f"--epochs {self.recipe.epochs} --threads {self.threads}"
         )
 
     def _config(self) -> dict[str, Any]:
@@ -98,7 +88,7 @@ class Run:
             "recipe": asdict(self.recipe),
             "seed": self.seed,
             "threads": self.threads,
-            "clips": len(self.clips),
+            "clips": len(self.material.seen),
             "libraries": library_versions(),
         }
 
