@@ -44,7 +44,7 @@ def test_it_ends_with_its_starter_however_that_ends() -> None:
     ) as starter:
         assert starter.stdout is not None
         port = int(starter.stdout.readline())
-        with fervor_client.sync.connect(f"ws://{HOST}:{port}") as session:
+        with fervor_client.sync.connect(f"ws://{HOST}:{port}", resume=False) as session:
             os.kill(starter.pid, signal.SIGKILL)
             with pytest.raises(fervor_client.Unreachable, match="code 1012"):
                 session.recv(timeout=20)
