@@ -5,15 +5,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from fervor_export.clip import Clip
-from fervor_export.data.dataset import load_dataset
+from fervor_export.data.dataset import CAST_CLIPS, SYNTHETIC, load_dataset
 from fervor_export.synthetic import synthesise_dataset
 from fervor_export.training import split_by_actor
-
-SYNTHETIC = "synthetic"
-GENERATED = "procedurally generated expressive motion, no recordings of people"
-"""What it is, in the words of the model's metadata."""
-CAST_CLIPS = 1000
-"""Synthetic clips of one cast of actors; more clips have more casts, and the finished network is scored on another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,6 +16,8 @@ class Material:
 
     description: str
     purpose: Literal["demo", "research"]
+    everything: list[Clip] = field(repr=False)
+    """All clips of the data set."""
     learn: list[Clip] = field(repr=False)
     validate: list[Clip] = field(repr=False)
     test: list[Clip] = field(repr=False)
@@ -29,8 +25,9 @@ class Material:
 
     @property
     def seen(self) -> list[Clip]:
-        """Training and validation clips, copies not counted."""
-        return [*self.learn, *self.validate]
+        """Training and validation clips, copies not counted, in the order of the data set."""
+        ours = {id(clip) for clip in (*self.learn, *self.validate)}
+        return [clip for clip in self.everything if id(clip) in ours]
 
 
 def gather(source: str, *, clips: int, seed: int, progress: Callable[[int, int], None] = lambda *_: None) -> Material:
@@ -41,13 +38,10 @@ def gather(source: str, *, clips: int, seed: int, progress: Callable[[int, int],
     Raises:
         DataError: the data set can't be used, or has fewer than three actors and no split of its own.
     """
+    data = load_dataset(source, progress=progress, clips=clips, seed=seed)
     if source == SYNTHETIC:
-        everything, test = _synthetic(clips, seed)
-        learn, validate = split_by_actor(everything, seed=seed)
-        return Material(
-            "procedurally generated expressive motion, no recordings of people", "demo", learn, validate, test
-        )
-    data = load_dataset(source, progress=progress)
+        learn, validate = split_by_actor(data.clips, seed=seed)
+        return Material(data.description, data.purpose, data.clips, learn, validate, _another_cast(clips, seed))
     intense = set(map(id, data.intense))
     given = {name: [clip for clip in part if id(clip) in intense] for name, part in data.splits.items()}
     if given.get("train") and given.get("test"):
@@ -55,13 +49,10 @@ def gather(source: str, *, clips: int, seed: int, progress: Callable[[int, int],
     else:
         rest, test = split_by_actor(data.intense, seed=seed)
     learn, validate = (rest, given["validation"]) if given.get("validation") else split_by_actor(rest, seed=seed)
-    return Material(data.description, data.purpose, learn, validate, test)
+    return Material(data.description, data.purpose, data.clips, learn, validate, test)
 
 
-def _synthetic(clips: int, seed: int) -> tuple[list[Clip], list[Clip]]:
-    """Clips to train and validate on, and clips of another cast for the test."""
+def _another_cast(clips: int, seed: int) -> list[Clip]:
+    """Synthetic clips of actors that those to learn from don't show."""
     casts = -(-clips // CAST_CLIPS)
-    seeds = range(seed * 1000, seed * 1000 + casts + 1)  # runs with other seeds have other casts
-    sizes = [CAST_CLIPS] * (casts - 1) + [clips - CAST_CLIPS * (casts - 1), min(clips, CAST_CLIPS)]
-    *parts, test = (synthesise_dataset(clips=size, seed=cast) for cast, size in zip(seeds, sizes, strict=True))
-    return [clip for part in parts for clip in part], test
+    return synthesise_dataset(clips=min(clips, CAST_CLIPS), seed=1000 * seed + casts)

@@ -8,9 +8,10 @@ from typing import Any
 from fervor.metadata import TrainingData
 from fervor_export.checkpoint import TrainedNetwork, save_checkpoint
 from fervor_export.clip import digest
+from fervor_export.data.dataset import SYNTHETIC
 from fervor_export.evaluation.held_out import write_learned_from
 from fervor_export.export import describe, export_model, library_versions
-from fervor_export.material import SYNTHETIC, Material
+from fervor_export.material import Material
 from fervor_export.model_card import model_card
 from fervor_export.prediction import fit, predict
 from fervor_export.recipe import Recipe
