@@ -6,12 +6,41 @@ import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import MessageError
 from fervor.protocol.codec import JsonCodec, MsgpackCodec
-from fervor.protocol.messages import Estimate, Frame, Raw
+from fervor.protocol.messages import ClientMessage, Estimate, Frame, Raw
 
 CODEC = JsonCodec()
+
+NONSENSE = 20_000
+
+
+@pytest.mark.parametrize(
+    ("text", "mistakes"),
+    [
+        ('{"type":"frame","seq":1,"q":[' + "[]," * NONSENSE + "[]]}", 6),
+        ('{"type":"frame","seq":1,"q":[' + "1," * NONSENSE + "1]}", 3),
+        ('{"type":"frame","seq":1,"p":[' + "[1]," * NONSENSE + "1]}", 4),
+        ('{"type":"frame","seq":1,"mask":[' + "1," * NONSENSE + "1]}", 1),
+        ('{"type":"frames","frames":[' + "{}," * NONSENSE + "{}]}", 2),
+        ('{"type":"frames","frames":[' + '{"seq":1},' * NONSENSE + '{"seq":1}]}', 1),
+        ('{"type":"session.start","joints":[' + "1," * NONSENSE + "1]}", 1),
+        ('{"type":"session.start","resume":[' + "1," * NONSENSE + "1]}", 1),
+    ],
+)
+def test_nonsense_is_not_told_one_by_one(text: str, mistakes: int) -> None:
+    """A megabyte of it would take tens of seconds, in which nobody else is served."""
+    with pytest.raises(ValidationError) as raised:
+        TypeAdapter(ClientMessage).validate_json(text, strict=True)
+    assert raised.value.error_count() <= mistakes
+
+
+def test_a_huge_input_is_shown_in_few_words() -> None:
+    with pytest.raises(MessageError) as raised:
+        CODEC.decode_client('{"type":"frame","seq":1,"emotion":{' + ",".join(f'"{n}":1' for n in range(5000)) + "}}")
+    assert len(raised.value.message) < 200
 
 
 @pytest.mark.parametrize(

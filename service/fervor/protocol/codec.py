@@ -1,6 +1,7 @@
 """Bytes to messages and back. One codec per subprotocol; a codec knows nothing of what was said before."""
 
 import re
+import reprlib
 from collections.abc import Mapping
 from typing import Protocol, TypeVar
 
@@ -113,8 +114,9 @@ def one_sentence(error: ValidationError) -> str:
         return f"{place} is missing"
     if first["type"].startswith("union_tag"):
         return f"the message's type is not known: {problem}"
-    came = repr(first["input"])
-    return f"{place}: {problem[0].lower()}{problem[1:]}, but {came if len(came) <= 60 else came[:57] + '...'} came"
+    came = first["input"]
+    shown = reprlib.repr(came) if isinstance(came, dict | list | tuple) else repr(came)  # a container may be huge
+    return f"{place}: {problem[0].lower()}{problem[1:]}, but {shown if len(shown) <= 60 else shown[:57] + '...'} came"
 
 
 def _place(loc: tuple[int | str, ...]) -> str:

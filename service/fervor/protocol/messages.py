@@ -12,19 +12,25 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, RootModel, StringConstraints, model_validator
 
 from fervor.levels import Level
-from fervor.protocol.skeleton_spec import SkeletonSpec
+from fervor.protocol.skeleton_spec import MOST_JOINTS, SkeletonSpec
 from fervor.skeletons.calibration import HeldPose
 from fervor.skeletons.skeleton import Axes, QuaternionOrder
 
 PROTOCOL = "fervor.v1"
 """Name and major version; a subprotocol adds the encoding: `fervor.v1.json`."""
 
+MOST_FRAMES = 4096
+"""Frames in one message, whatever the service is set to."""
+
+MOST_LABELS = 64
+"""Entries of a probability per emotion."""
+
 BodyId = Annotated[str, StringConstraints(min_length=1, max_length=64)]
 """The client's name for a tracked person, unique in its session."""
 
 EmotionLabel = Annotated[str, StringConstraints(max_length=32)]
 
-Emotion = EmotionLabel | dict[EmotionLabel, float]
+Emotion = EmotionLabel | Annotated[dict[EmotionLabel, float], Field(max_length=MOST_LABELS)]
 """A label, or a probability per emotion as face analysers give it."""
 
 Clock = Literal["time", "frames"]
@@ -44,6 +50,12 @@ Flag = Literal[
     "between_steps", "interpolated", "held", "gap_reset", "clock_reset", "reset", "late", "duplicate", "jump", "lost"
 ]
 """What happened to a frame on its way: see docs/reference/protocol.md."""
+
+# Arrays of what a client says are bounded and stop at their first mistake: told one by one, the mistakes of a megabyte
+# of nonsense would hold up everybody for seconds.
+
+Joints = Annotated[tuple[str, ...], Field(max_length=MOST_JOINTS, fail_fast=True)]
+"""Names of joints."""
 
 
 class _Message(BaseModel):
@@ -66,7 +78,7 @@ class SessionStart(_Message):
     skeleton: str | SkeletonSpec = Field("c13", description="name from /v1/skeletons, or one of your own")
     axes: Axes | None = Field(None, description="default: what the skeleton's sensor gives")
     quaternion: QuaternionOrder | None = Field(None, description="default: what the skeleton's sensor gives")
-    joints: tuple[str, ...] | None = Field(None, description="joints sent, in this order; others count as untracked")
+    joints: Joints | None = Field(None, description="joints sent, in this order; others count as untracked")
     nominal_hz: float | None = Field(None, gt=0, le=1000, description="the sensor's rate; used by clock `frames`")
     clock: Clock = "time"
     delivery: Delivery = "every"
@@ -79,13 +91,24 @@ class SessionStart(_Message):
     checkpoint_s: float | None = Field(
         None, ge=0.1, description="seconds between the checkpoints of a body, client clock; absent: none are sent"
     )
-    resume: tuple[str, ...] = Field((), max_length=64, description="checkpoint tokens to go on from, one a body")
+    resume: tuple[str, ...] = Field(
+        (), max_length=64, fail_fast=True, description="checkpoint tokens to go on from, one a body"
+    )
 
 
 Quaternion = Annotated[tuple[float, float, float, float], Field(description="zero or null means untracked")]
 
 
 Vector = tuple[float, float, float]
+
+Quaternions = Annotated[tuple[Quaternion | None, ...], Field(max_length=MOST_JOINTS, fail_fast=True)]
+"""One a joint."""
+
+Vectors = Annotated[tuple[Vector | None, ...], Field(max_length=MOST_JOINTS, fail_fast=True)]
+"""One a joint."""
+
+Mask = Annotated[tuple[bool, ...], Field(max_length=MOST_JOINTS, fail_fast=True)]
+"""One a joint: whether it is tracked."""
 
 
 class Raw(RootModel[bytes]):
@@ -108,13 +131,11 @@ class Frame(_Message):
     body: BodyId = "0"
     seq: int = Field(ge=0, le=2**53, description="rises by one or more from frame to frame")
     t: float | None = Field(None, allow_inf_nan=False, description="seconds, client clock; needed by clock `time`")
-    q: tuple[Quaternion | None, ...] | Raw | None = Field(
-        None, description="one quaternion a joint; null where untracked"
-    )
-    p: tuple[Vector | None, ...] | Raw | None = Field(
+    q: Quaternions | Raw | None = Field(None, description="one quaternion a joint; null where untracked")
+    p: Vectors | Raw | None = Field(
         None, description="landmark sensors, in place of q: one position a joint, right-handed, any unit"
     )
-    mask: tuple[bool, ...] | None = Field(None, description="false where untracked")
+    mask: Mask | None = Field(None, description="false where untracked")
     emotion: Emotion | None = Field(None, description="a new label; absent: the old one holds; `unknown` clears it")
 
 
@@ -122,7 +143,7 @@ class Frames(_Message):
     """Several frames in one message, answered by one `estimates`."""
 
     type: Literal["frames"] = "frames"
-    frames: tuple[Frame, ...] = Field(min_length=1)
+    frames: tuple[Frame, ...] = Field(min_length=1, max_length=MOST_FRAMES, fail_fast=True)
 
 
 class BodyReset(_Message):
@@ -192,6 +213,9 @@ class Limits(_Answer):
     max_bodies: int = 16
     max_frames_per_message: int = 1024
     max_frames_per_second: float = 2000.0
+    max_joints: int = MOST_JOINTS
+    max_unanswered_frames: int = 4096
+    max_unsent_bytes: int = 4_194_304
     start_timeout_s: float = 10.0
     idle_timeout_s: float = 60.0
     body_idle_s: float = 10.0

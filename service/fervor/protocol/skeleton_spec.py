@@ -22,8 +22,12 @@ class SkeletonSpec(BaseModel):
 
     name: str = Field(min_length=1, max_length=64)
     title: str = ""
-    joints: tuple[str, ...] = Field(min_length=1, max_length=MOST_JOINTS, description="in the order they are sent")
-    parents: tuple[int, ...] = Field(description="index of each joint's parent; -1 for a root")
+    joints: tuple[str, ...] = Field(
+        min_length=1, max_length=MOST_JOINTS, fail_fast=True, description="in the order they are sent"
+    )
+    parents: tuple[int, ...] = Field(
+        max_length=MOST_JOINTS, fail_fast=True, description="index of each joint's parent; -1 for a root"
+    )
     segments: dict[str, str] = Field(description="rig segment → the joint whose absolute rotation is that segment's")
     bind: dict[str, Numbers4] = Field(
         default_factory=dict, description="rig segment → alignment A, xyzw; identity where absent"

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from fervor.levels import Level
-from fervor.protocol.messages import Clock, Emotion, Estimate, Memory, ModelInfo, Quaternion, Vector
+from fervor.protocol.messages import Clock, Emotion, Estimate, Joints, Mask, Memory, ModelInfo, Quaternions, Vectors
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.scoring import summarise
 from fervor.skeletons.skeleton import Axes, QuaternionOrder
@@ -43,11 +43,9 @@ class ScoreFrame(_Strict):
     """One timestamped pose."""
 
     t: float | None = Field(None, allow_inf_nan=False, description="seconds; needed by clock `time`")
-    q: tuple[Quaternion | None, ...] | None = Field(None, description="one quaternion a joint; null where untracked")
-    p: tuple[Vector | None, ...] | None = Field(
-        None, description="landmark sensors, in place of q: one position a joint"
-    )
-    mask: tuple[bool, ...] | None = Field(None, description="false where untracked")
+    q: Quaternions | None = Field(None, description="one quaternion a joint; null where untracked")
+    p: Vectors | None = Field(None, description="landmark sensors, in place of q: one position a joint")
+    mask: Mask | None = Field(None, description="false where untracked")
 
 
 class ScoreSequence(_Strict):
@@ -55,7 +53,7 @@ class ScoreSequence(_Strict):
 
     name: str = Field("", max_length=256)
     emotion: Emotion | None = Field(None, description="holds for the whole sequence; absent: unknown")
-    frames: tuple[ScoreFrame, ...] = Field(min_length=1)
+    frames: tuple[ScoreFrame, ...] = Field(min_length=1, fail_fast=True)
 
 
 class Manner(_Strict):
@@ -75,9 +73,9 @@ class ScoreRequest(Manner):
     skeleton: str | SkeletonSpec = Field("c13", description="name from /v1/skeletons, or one of your own")
     axes: Axes | None = Field(None, description="default: what the skeleton's sensor gives")
     quaternion: QuaternionOrder | None = Field(None, description="default: what the skeleton's sensor gives")
-    joints: tuple[str, ...] | None = Field(None, description="joints sent, in this order; others count as untracked")
+    joints: Joints | None = Field(None, description="joints sent, in this order; others count as untracked")
     nominal_hz: float | None = Field(None, gt=0, le=1000, description="the sensor's rate; used by clock `frames`")
-    sequences: tuple[ScoreSequence, ...] = Field(min_length=1)
+    sequences: tuple[ScoreSequence, ...] = Field(min_length=1, fail_fast=True)
 
 
 class FileOptions(Manner):

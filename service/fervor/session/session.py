@@ -170,6 +170,9 @@ class Session:
             self._agreement = agree(message, self._host.metadata, self._host.skeletons)
         except InputError as error:
             raise ProtocolError(error.message) from None
+        joints, most = len(self._agreement.terms.source.skeleton.joints), self._host.limits.max_joints
+        if joints > most:
+            raise ProtocolError(f"the skeleton has {joints} joints; this service takes at most {most}")
         if message.clock == "frames":
             self._roster = Roster(self._host.claim, most=self._host.limits.max_bodies, idle_s=math.inf)
         resumed, restores = self._resume(message.resume)
