@@ -64,6 +64,16 @@ def test_tokens_are_split_and_never_shown(monkeypatch: pytest.MonkeyPatch) -> No
     assert "alpha" not in repr(settings)
 
 
+def test_origins_are_split_and_an_option() -> None:
+    assert Settings.load(origins="https://A.example, *").origins == ("https://a.example", "*")
+    assert is_option("origins")
+
+
+def test_keys_have_one_home(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="both given; expected one of them"):
+        Settings.load(checkpoint_keys="k" * 20, checkpoint_keys_file=tmp_path)
+
+
 def test_a_secret_is_no_option() -> None:
     assert not is_option("tokens")
     assert is_option("port")

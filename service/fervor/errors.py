@@ -16,6 +16,7 @@ exit code of the command line (sysexits.h).
     │           ├── TooLarge · StartTimeout · IdleTimeout · RateExceeded
     │           └── CheckpointUnknown · CheckpointMismatch
     ├── AuthError             no or a wrong token
+    ├── OriginRefused         a web page of a site that may not use the service
     ├── Overloaded            not now; try again later
     ├── Unreachable           no service answers, or it went away
     └── EngineError           our own fault
@@ -178,6 +179,15 @@ class AuthError(FervorError):
 
     code = "unauthorized"
     http_status = 401
+    close_code = CloseCode.AUTH
+    exit_code = 77
+
+
+class OriginRefused(FervorError):
+    """A web page of a site that may not use this service."""
+
+    code = "origin_refused"
+    http_status = 403
     close_code = CloseCode.AUTH
     exit_code = 77
 

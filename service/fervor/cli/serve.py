@@ -39,7 +39,7 @@ def _kind(annotation: Any) -> str:
     choices = get_args(annotation)
     if choices and all(isinstance(choice, str) for choice in choices):
         return "|".join(choices)
-    return {int: "NUMBER", float: "NUMBER", str: "TEXT"}.get(annotation, "FILE")
+    return {int: "NUMBER", float: "NUMBER", str: "TEXT", tuple[str, ...]: "TEXT"}.get(annotation, "FILE")
 
 
 serve.__signature__ = _signature()  # type: ignore[attr-defined]  # how typer learns a function's options
