@@ -143,15 +143,16 @@ class RawClient:
 
     UPGRADE = (
         "GET /v1/stream HTTP/1.1\r\nHost: {}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        "Sec-WebSocket-Protocol: {}\r\n\r\n"
     )
 
-    def __init__(self, live: Live) -> None:
+    def __init__(self, live: Live, *, subprotocol: str = PROTOCOL) -> None:
         self.socket = socket.socket()
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         host, port = live.address.split(":")
         self.socket.connect((host, int(port)))
-        self.socket.sendall(self.UPGRADE.format(live.address).encode())
+        self.socket.sendall(self.UPGRADE.format(live.address, subprotocol).encode())
         while b"\r\n\r\n" not in self.socket.recv(4096):
             pass
 
