@@ -43,20 +43,18 @@ class Batcher:
         self._releasing: set[int] = set()
         self._scheduled = False
         self._since = 0.0  # when the batch to come got its first ticket, seconds
+        self.depth = 0
+        """Tickets that wait."""
         self._watchers: list[Callable[[Run], None]] = []
 
     def watch(self, watcher: Callable[[Run], None]) -> None:
         """Be told of every run."""
         self._watchers.append(watcher)
 
-    @property
-    def depth(self) -> int:
-        """Tickets that wait."""
-        return sum(map(len, self._waiting.values()))
-
     def submit(self, ticket: Ticket, deliver: Deliver) -> None:
         """Queue a ticket; `deliver` is called with its outcome soon, never from within this call."""
         self._waiting.setdefault(ticket.slot, deque()).append((ticket, deliver))
+        self.depth += 1
         self._schedule()
 
     def release(self, slot: int) -> None:
@@ -89,7 +87,8 @@ class Batcher:
             try:
                 deliver(ticket, outcome)
             except Exception:  # one session's fault must not cost the others their answers
-                log.exception("a session failed on the outcome of frame %d of body %r", ticket.seq, ticket.body)
+                sentence = "a session failed on the outcome of frame %d of body %r"
+                log.exception(sentence, ticket.seq, ticket.body, extra={"body": ticket.body})
         for watcher in self._watchers:
             watcher(run)
 
@@ -103,6 +102,7 @@ class Batcher:
     def _take(self, slot: int) -> tuple[Ticket, Deliver]:
         queue = self._waiting.pop(slot)
         first = queue.popleft()
+        self.depth -= 1
         if queue:
             self._waiting[slot] = queue  # to the end: slots take turns
         return first

@@ -4,10 +4,11 @@ Readiness is false from the first moment, so that a load balancer sends nobody n
 """
 
 import asyncio
-from collections.abc import Iterator
+from functools import reduce
 from typing import Protocol
 
 from fervor.protocol.messages import Totals
+from fervor.server.traffic import Traffic
 
 
 class Leaving(Protocol):
@@ -17,8 +18,15 @@ class Leaving(Protocol):
     def totals(self) -> Totals:
         """So far."""
 
+    @property
+    def traffic(self) -> Traffic:
+        """What went over the wire so far."""
+
     def go_away(self, seconds: float) -> None:
         """Say so, send the last checkpoints, and close once they are out."""
+
+    def send_away(self, retry_after: float) -> None:
+        """Close with 1013: there is more load than the service can bear; `retry_after` is in seconds."""
 
 
 class Drain:
@@ -27,26 +35,31 @@ class Drain:
     def __init__(self) -> None:
         self.started = False
         self.begun = 0
-        self.talking: set[Leaving] = set()
+        self.talking: dict[Leaving, None] = {}  # oldest first
         self._ended = Totals()
+        self._carried = Traffic()
         self._empty = asyncio.Event()
 
     def enter(self, conversation: Leaving) -> None:
         """A conversation began."""
         self.begun += 1
-        self.talking.add(conversation)
+        self.talking[conversation] = None
 
     def leave(self, conversation: Leaving) -> None:
         """A conversation is over."""
-        self.talking.discard(conversation)
+        self.talking.pop(conversation, None)
         self._ended = add(self._ended, conversation.totals)
+        self._carried = self._carried + conversation.traffic
         if not self.talking:
             self._empty.set()
 
-    def all_totals(self) -> Iterator[Totals]:
-        """What all conversations came to, those that are over in one."""
-        yield self._ended
-        yield from (conversation.totals for conversation in self.talking)
+    def all_totals(self) -> Totals:
+        """What all conversations came to."""
+        return reduce(add, (conversation.totals for conversation in self.talking), self._ended)
+
+    def all_traffic(self) -> Traffic:
+        """What went over all wires."""
+        return sum((conversation.traffic for conversation in self.talking), self._carried)
 
     async def run(self, seconds: float) -> bool:
         """Send everybody away; whether all were gone within `seconds`."""

@@ -1,35 +1,51 @@
 """What waits to be sent to one client: in order, bounded in bytes, sent by one task.
 
-A client that reads too slowly fills its outbox and nobody else's. Who puts into a full outbox is told so and decides.
+A client that reads too slowly fills its outbox and nobody else's. A message that a newer one makes useless (an older
+checkpoint of the body; with delivery `latest`, an older estimate) leaves when that comes: newest wins. Who puts into a
+full outbox is told so and decides.
 """
 
 import asyncio
-from collections import deque
+from collections import OrderedDict
+from collections.abc import Hashable
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
-
+from fervor.server.wire import Wire
 from fervor.session.events import Close
 
 
 class Outbox:
-    """Messages to one WebSocket."""
+    """Messages to one client."""
 
-    def __init__(self, websocket: WebSocket, *, most_bytes: int) -> None:
-        self._websocket = websocket
+    def __init__(self, wire: Wire, *, most_bytes: int) -> None:
+        self._wire = wire
         self._most_bytes = most_bytes
-        self._waiting: deque[str | bytes | Close] = deque()
+        self._waiting: OrderedDict[Hashable, str | bytes | Close] = OrderedDict()
         self._bytes = 0
         self._something = asyncio.Event()
         self._stuck = False
+        self._put = 0
+        self.bytes_sent = 0
+        self.superseded = 0
 
     @property
     def full(self) -> bool:
         """Whether the client takes no bytes just now, and more waits for it than may."""
         return self._stuck and self._bytes > self._most_bytes
 
-    def put(self, message: str | bytes | Close) -> None:
-        """Send this after everything put before; a `Close` is the last."""
-        self._waiting.append(message)
+    def put(self, message: str | bytes | Close, *, topic: Hashable = None) -> None:
+        """Send this after everything put before; a `Close` is the last.
+
+        Args:
+            message: encoded.
+            topic: takes the place of what still waits under the same topic; None for none.
+        """
+        self._put += 1
+        key = self._put if topic is None else topic
+        old = self._waiting.pop(key, None)
+        if old is not None and not isinstance(old, Close):
+            self._bytes -= len(old)
+            self.superseded += 1
+        self._waiting[key] = message
         self._bytes += 0 if isinstance(message, Close) else len(message)
         self._something.set()
 
@@ -43,21 +59,19 @@ class Outbox:
         try:
             while True:
                 while self._waiting:
-                    message = self._waiting.popleft()
+                    _, message = self._waiting.popitem(last=False)
                     if isinstance(message, Close):
-                        await self._websocket.close(message.code, message.reason)
+                        await self._wire.close(message.code, message.reason)
                         return
                     self._bytes -= len(message)
                     await self._send(message)
                 self._something.clear()
                 await self._something.wait()
-        except WebSocketDisconnect:
+        except ConnectionError:
             return
 
     async def _send(self, message: str | bytes) -> None:
         self._stuck = True  # nobody sees it unless the send has to wait
-        if isinstance(message, str):
-            await self._websocket.send_text(message)
-        else:
-            await self._websocket.send_bytes(message)
+        await self._wire.send(message)
         self._stuck = False
+        self.bytes_sent += len(message)
