@@ -268,6 +268,31 @@ async def test_scoring_hurts_no_live_session(live: Live) -> None:
         assert (await scoring).status_code == 200
 
 
+@pytest.mark.parametrize("field", ["file", "option"])
+def test_a_form_of_countless_parts_is_told_413(field: str, http: httpx.Client) -> None:
+    part = 'Content-Disposition: form-data; name="{}{}"{}\r\n\r\n'
+    parts = "".join(
+        f"--b\r\n{part.format(field, number, '; filename=a.bvh' if field == 'file' else '')}x\r\n"
+        for number in range(50_000)
+    )
+    content_type = {"Content-Type": "multipart/form-data; boundary=b"}
+    answer = http.post("/v1/score/file", content=f"{parts}--b--\r\n", headers=content_type)
+    assert answer.status_code == 413
+    assert answer.json()["code"] == "too_large"
+
+
+def test_a_request_that_takes_too_long_is_given_up_and_the_next_is_answered(start_service) -> None:
+    service = start_service(score_timeout_s=0.01)
+    request = score_request(frames_of(motion(300)))
+    answer = httpx.post(f"{service.url}/v1/score", json=request, timeout=60)
+    assert (answer.status_code, answer.json()["detail"]) == (
+        503,
+        "the request took longer than 0.01 s, and was given up",
+    )
+    service.service.scoring._timeout_s = 60.0
+    assert httpx.post(f"{service.url}/v1/score", json=request, timeout=60).status_code == 200
+
+
 async def test_a_request_too_many_is_told_to_come_later(start_service) -> None:
     service = start_service(score_queue=1)
     async with httpx.AsyncClient(base_url=service.url, timeout=60) as client:

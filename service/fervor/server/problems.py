@@ -18,7 +18,15 @@ from fervor.errors import FervorError
 
 MEDIA_TYPE = "application/problem+json"
 
-CODES = {400: "bad_request", 404: "not_found", 405: "method_not_allowed", 413: "too_large", 426: "upgrade_required"}
+CODES = {
+    400: "bad_request",
+    404: "not_found",
+    405: "method_not_allowed",
+    408: "request_timeout",
+    413: "too_large",
+    426: "upgrade_required",
+    431: "headers_too_large",
+}
 """Codes of errors that come from the web framework and not from our own tree."""
 
 

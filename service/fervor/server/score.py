@@ -6,15 +6,17 @@ The routes read no more than is allowed and hand the body on unread; see `scorin
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
+from fervor.errors import RequestError
 from fervor.server.problems import problem_responses, too_large
 from fervor.server.scoring_models import MULTIPART, FileOptions, ScoreResponse
 from fervor.server.service import Service, service_of
 
 router = APIRouter(prefix="/v1", tags=["score"])
 
-PROBLEMS = problem_responses(401, 413, 422, 503)
+PROBLEMS = problem_responses(401, 403, 413, 422, 503)
 
 _FILE = {"type": "string", "format": "binary"}
 
@@ -72,10 +74,13 @@ async def read_body(request: Request, limit: int) -> bytes:
     if int(request.headers.get("content-length", 0)) > limit:
         raise too_large(limit)
     body = bytearray()
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > limit:
-            raise too_large(limit)
+    try:
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > limit:
+                raise too_large(limit)
+    except ClientDisconnect:
+        raise RequestError("the client went away before its request was whole") from None
     return bytes(body)
 
 

@@ -92,7 +92,7 @@ class ScoringJobs:
             InputError: an option or a file can't be used; says which.
             TooLarge: more frames or files than allowed.
         """
-        fields, uploads = _read_form(body, content_type) if content_type.startswith(MULTIPART) else ({}, [])
+        fields, uploads = self._read_form(body, content_type) if content_type.startswith(MULTIPART) else ({}, [])
         try:
             options = FileOptions.model_validate({**query, **fields})
         except ValidationError as error:
@@ -106,6 +106,28 @@ class ScoringJobs:
         self._check(len(uploads), sum(map(len, recordings)))
         metadata = self._model.metadata
         return self._answer(score_recording(self._scorer, metadata, recording, options) for recording in recordings)
+
+    def _read_form(self, body: bytes, content_type: str) -> tuple[dict[str, str], list[Upload]]:
+        """The fields of a form, and its files; no more of both than could be of use."""
+        fields: dict[str, str] = {}
+        uploads: list[Upload] = []
+
+        def keep_field(field: Field) -> None:
+            fields[_text(field.field_name)] = _text(field.value)
+            if len(fields) > len(FileOptions.model_fields):
+                raise TooLarge(f"the form has more than {len(FileOptions.model_fields)} fields beside its files")
+
+        def keep_file(file: File) -> None:
+            file.file_object.seek(0)
+            uploads.append(Upload(_text(file.file_name), file.file_object.read()))
+            file.close()
+            self._check(len(uploads), 0)
+
+        try:
+            parse_form({"Content-Type": content_type.encode()}, io.BytesIO(body), keep_field, keep_file)
+        except FormParserError as error:
+            raise RequestError(f"the form can't be read: {error}") from None
+        return fields, uploads
 
     def _answer(self, scores: Iterable[SequenceScore]) -> bytes:
         model = self._model
@@ -141,26 +163,6 @@ def _read_recording(upload: Upload, skeleton: str | None) -> Recording:
     stream = io.BytesIO(upload.content)
     stream.name = upload.filename  # what readers call the file in their messages, and tell its kind by
     return read_recording(stream, skeleton=skeleton)
-
-
-def _read_form(body: bytes, content_type: str) -> tuple[dict[str, str], list[Upload]]:
-    """The fields of a form, and its files."""
-    fields: dict[str, str] = {}
-    uploads: list[Upload] = []
-
-    def keep_field(field: Field) -> None:
-        fields[_text(field.field_name)] = _text(field.value)
-
-    def keep_file(file: File) -> None:
-        file.file_object.seek(0)
-        uploads.append(Upload(_text(file.file_name), file.file_object.read()))
-        file.close()
-
-    try:
-        parse_form({"Content-Type": content_type.encode()}, io.BytesIO(body), keep_field, keep_file)
-    except FormParserError as error:
-        raise RequestError(f"the form can't be read: {error}") from None
-    return fields, uploads
 
 
 def _text(raw: bytes | None) -> str:

@@ -13,13 +13,16 @@ import logging
 import pickle
 import struct
 import sys
+import time
 from asyncio.subprocess import PIPE, Process
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from fervor.errors import EngineError, FervorError, Overloaded
+from fervor.settings import LogFormat, LogLevel
 
 log = logging.getLogger(__name__)
 
@@ -51,34 +54,47 @@ class Start:
     row_multiple: int
     skeletons: Path | None
     allowed: Allowed
+    logs: tuple[LogFormat, LogLevel] = ("text", "info")
 
 
 class ScoringProcess:
     """The service's end; the other one is `scoring_worker`."""
 
-    def __init__(self, start: Start, *, most_waiting: int) -> None:
+    def __init__(self, start: Start, *, most_waiting: int, timeout_s: float) -> None:
         self._how = start
         self._most_waiting = most_waiting
-        self._waiting = 0
+        self._timeout_s = timeout_s
+        self.waiting = 0
+        """Requests under way."""
+        self.refused = 0
+        self._watchers: list[Callable[[float], None]] = []
         self._turn = asyncio.Lock()
         self._process: Process | None = None
+
+    def watch(self, watcher: Callable[[float], None]) -> None:
+        """Be told how many seconds each job took."""
+        self._watchers.append(watcher)
 
     async def run(self, job: Job, *arguments: object) -> bytes:
         """Do a job when its turn comes, and return the response body.
 
         Raises:
             FervorError: whatever the job raised.
-            Overloaded: too many requests wait already.
+            Overloaded: too many requests wait already, or this one took too long.
             EngineError: the process ended without an answer.
         """
-        if self._waiting >= self._most_waiting:
-            raise Overloaded(f"{self._waiting} scoring requests wait already; try again later", retry_after=5.0)
-        self._waiting += 1
+        if self.waiting >= self._most_waiting:
+            self.refused += 1
+            raise Overloaded(f"{self.waiting} scoring requests wait already; try again later", retry_after=5.0)
+        self.waiting += 1
         try:
             async with self._turn:
-                answer = await self._ask(pickle.dumps((job, arguments)))
+                began = time.perf_counter()
+                answer = await self._ask_for_so_long(pickle.dumps((job, arguments)))
+                for watcher in self._watchers:
+                    watcher(time.perf_counter() - began)
         finally:
-            self._waiting -= 1
+            self.waiting -= 1
         if isinstance(answer, FervorError):
             raise answer
         return answer
@@ -89,6 +105,13 @@ class ScoringProcess:
             _kill(self._process)  # a request under way ends now, and gives up its turn
         async with self._turn:
             await self._discard()
+
+    async def _ask_for_so_long(self, question: bytes) -> bytes | FervorError:
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                return await self._ask(question)
+        except TimeoutError:
+            return Overloaded(f"the request took longer than {self._timeout_s:g} s, and was given up")
 
     async def _ask(self, question: bytes) -> bytes | FervorError:
         process = self._process or await self._start()

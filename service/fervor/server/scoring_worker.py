@@ -16,6 +16,7 @@ from typing import IO
 from fervor.errors import EngineError, FervorError, ModelFileError
 from fervor.model import Model
 from fervor.server.kept_skeletons import load_skeletons
+from fervor.server.logs import configure_logs
 from fervor.server.scoring_jobs import ScoringJobs
 from fervor.server.scoring_process import LENGTH, Start
 
@@ -66,7 +67,9 @@ class Worker:
 
 def serve(questions: IO[bytes], answers: IO[bytes]) -> None:
     """Answer until there are no more questions; the first one says how to start."""
-    worker = Worker(pickle.loads(_read(questions)))  # noqa: S301  # from our own service
+    start = pickle.loads(_read(questions))  # noqa: S301  # from our own service
+    configure_logs(*start.logs)
+    worker = Worker(start)
     while question := _read(questions):
         answer = pickle.dumps(worker.answer(question))
         answers.write(LENGTH.pack(len(answer)) + answer)
@@ -81,7 +84,6 @@ def _read(questions: IO[bytes]) -> bytes:
 
 def main() -> None:
     """Run as a process."""
-    logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(name)s: %(message)s")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the service, which then ends us
     os.nice(NICENESS)
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
