@@ -8,7 +8,7 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check install --quiet --con
 # Slow proofs run in CI; `make test MARKS=` runs them here.
 MARKS  ?= $(if $(CI),,-m "not slow")
 
-.PHONY: help run test lint types bench clean
+.PHONY: help run test lint types audit bench clean
 .DEFAULT_GOAL := help
 
 help: ## what there is to say
@@ -27,6 +27,9 @@ lint: $(VENV)/dev.stamp ## style, format, and the floors of the architecture
 
 types: $(VENV)/dev.stamp ## mypy --strict on the three packages
 	@$(BIN)/mypy
+
+audit: $(VENV)/audit.stamp ## ask PyPI for known holes in the pinned versions (not part of CI: needs PyPI itself)
+	@$(BIN)/pip-audit --strict --requirement constraints.txt --no-deps --disable-pip --vulnerability-service pypi
 
 bench: $(VENV)/dev.stamp ## speed, as ratios measured in one run
 	@$(BIN)/python -m bench
