@@ -1,6 +1,8 @@
 """The WebSocket edge on a real server: handshake, order, sameness of the bits, timeouts, limits."""
 
 import asyncio
+import json
+import re
 import socket
 from pathlib import Path
 
@@ -196,6 +198,49 @@ async def test_too_many_frames_a_second_end_the_session(start_service) -> None:
         assert heard[-1]["code"] == "rate_exceeded"
         assert heard[-1]["message"] == "more than 10 frames a second came"
         assert (await stream.closed())[0] == 4429
+
+
+async def test_messages_that_cannot_be_read_count_as_what_they_had_room_for(start_service) -> None:
+    async with talk(start_service(max_frames_per_second=100, max_frames_per_message=100)) as stream:
+        await stream.start()
+        nonsense = "[" * 40_000
+        for expected in ("bad_message", "bad_message", "rate_exceeded"):
+            await stream.socket.send(nonsense)
+            assert (await stream.hear())["code"] == expected
+        assert (await stream.closed())[0] == 4429
+
+
+async def test_a_skeleton_with_too_many_joints_is_refused(start_service) -> None:
+    service = start_service(max_joints=20)
+    async with talk(service) as stream:
+        error = await stream.start(skeleton="kinect_v2")
+        assert error["message"] == "the skeleton has 25 joints; this service takes at most 20"
+        assert (await stream.closed())[0] == 4400
+    async with talk(service) as stream:
+        assert (await stream.start())["limits"]["max_joints"] == 20
+
+
+async def test_a_slow_reader_that_wants_the_latest_gets_it_and_is_never_closed(start_service) -> None:
+    service = start_service(max_unsent_bytes=20_000, max_frames_per_second=1e9)
+    slow = RawClient(service)
+    count = 600  # answers of 8 kB: many times what the sockets and the outbox hold
+
+    def send() -> None:
+        slow.send(b'{"type": "session.start", "delivery": "latest", "by_emotion": true}')
+        slow.read_until(b"session.started")
+        for seq in range(count):
+            pose = {"seq": seq, "t": seq / 30, "q": FRAMES[seq % 90]["q"]}
+            frames = [{"body": f"body {number}", **pose} for number in range(16)]
+            slow.send(json.dumps({"type": "frames", "frames": frames}).encode())
+
+    with slow.socket:
+        await asyncio.to_thread(send)
+        received = await asyncio.to_thread(slow.read_until, f'"body 15","seq":{count - 1},'.encode())
+    seqs = [int(number) for number in re.findall(rb'"body 15","seq":(\d+),', received)]
+    assert seqs == sorted(set(seqs))
+    assert len(seqs) < count
+    await eventually(lambda: service.service.sessions.open == 0)
+    assert service.service.drain.all_traffic().superseded > 0
 
 
 async def test_a_message_with_too_many_frames_ends_nothing(start_service) -> None:

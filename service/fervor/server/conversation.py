@@ -1,4 +1,4 @@
-"""One WebSocket: carries messages to a session, its tickets to the batcher, and its replies back to the client.
+"""One wire: carries messages to a session, its tickets to the batcher, and its replies back to the client.
 
 Rules. The session decides everything; this edge adds only what needs a clock or a socket: the two timeouts, the pace,
 and what becomes of a slow reader. All sends pass one outbox, so they leave in the order in which the session said
@@ -9,17 +9,28 @@ conversation.
 import asyncio
 import logging
 import secrets
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import assert_never
 
-from starlette.websockets import WebSocket
-
-from fervor.errors import EngineError, FervorError, IdleTimeout, Overloaded, StartTimeout
+from fervor.errors import CloseCode, EngineError, FervorError, IdleTimeout, MessageError, Overloaded, StartTimeout
 from fervor.protocol.codec import Codec
-from fervor.protocol.messages import ClientMessage, Frame, Frames, GoingAway, Totals
+from fervor.protocol.messages import (
+    Checkpoint,
+    ClientMessage,
+    Estimate,
+    Estimates,
+    Frames,
+    GoingAway,
+    ServerMessage,
+    SessionStart,
+    SessionStarted,
+    Totals,
+)
 from fervor.server.outbox import Outbox
 from fervor.server.pace import Pace
 from fervor.server.service import Service
+from fervor.server.traffic import Traffic
+from fervor.server.wire import Wire
 from fervor.session.events import Close, Event, Outcome, Release, Reply, Restore, Ticket
 from fervor.session.session import Session
 from fervor.session.state import SessionState
@@ -29,19 +40,44 @@ log = logging.getLogger(__name__)
 CLOSE_GRACE_S = 5.0
 """Seconds that a client has to take a close before it is left behind."""
 
+BYTES_A_FRAME = 1024
+"""A message that can't be read uses up the pace of as many frames as it had room for."""
+
+GONE = "gone"
+"""Why a session ended whose client left without a word."""
+
+REASONS = {CloseCode.NORMAL: "ended", CloseCode.RESTART: "restart"}
+"""Why a session ended, for programs; otherwise the code of the error that ended it."""
+
 
 class Conversation:
-    """A session and its socket."""
+    """A session and its wire."""
 
-    def __init__(self, websocket: WebSocket, service: Service, codec: Codec) -> None:
-        self._websocket = websocket
+    def __init__(self, wire: Wire, service: Service, codec: Codec, *, client: str | None = None) -> None:
+        """Begin.
+
+        Args:
+            wire: to the client.
+            service: that the session runs in.
+            codec: what was agreed on.
+            client: the name of the client's token, for logs.
+        """
+        self._wire = wire
         self._codec = codec
         self._settings = service.settings
         self._batcher = service.batcher
+        self._backlog = service.backlog
         self._drain = service.drain
+        self._metrics = service.metrics
+        self._tracing = service.tracing
         self._leaving = False
+        self._latest = False  # whether the client wants the newest estimates only
         self._session = Session(secrets.token_hex(8), service.host)
-        self._outbox = Outbox(websocket, most_bytes=service.settings.max_unsent_bytes)
+        self._about = {"session": self._session.session_id, "client": client}
+        self._log = logging.LoggerAdapter(log, self._about)
+        self._reason = GONE
+        self._traffic = Traffic()
+        self._outbox = Outbox(wire, most_bytes=service.settings.max_unsent_bytes)
         self._loop = asyncio.get_running_loop()
         self._opened = self._heard = self._loop.time()  # seconds; `heard`: when the newest message came
         self._pace = Pace(service.settings.max_frames_per_second, service.settings.max_frames_per_message)
@@ -55,32 +91,58 @@ class Conversation:
         """Talk until either side closes, then free what the session held."""
         sender = asyncio.create_task(self._send_all())
         self._drain.enter(self)
+        self._log.info("session begun (%s)", self._codec.subprotocol)
         try:
             async with self._patience:
                 await self._listen()
                 if self._session.state is SessionState.CLOSED:
                     await sender
         except TimeoutError:
-            log.info("session %s: the client did not take its close", self._session.session_id)
+            self._log.info("the client did not take its close")
         finally:
             self._watch.cancel()
             self._drain.leave(self)
             self._carry_out(self._session.lost())
             sender.cancel()
             await asyncio.gather(sender, return_exceptions=True)
+            self._sign_off()
 
     async def _listen(self) -> None:
-        """Take messages until the end; hold back a client that is far ahead of its answers."""
+        """Take messages until the end; hold back a client far ahead of its answers, and all when too much waits."""
         while self._session.state is not SessionState.CLOSED:
-            event = await self._websocket.receive()
-            if event["type"] == "websocket.disconnect":
+            message = await self._wire.receive()
+            if message is None:
                 return
             self._heard = self._loop.time()
-            text = event.get("text")
-            self._take(event["bytes"] if text is None else text)
+            self._traffic.bytes_in += len(message)
+            if self._backlog.full:
+                await self._backlog.wait()
+            self._take(message)
             while self._unanswered >= self._settings.max_unanswered_frames:
                 self._room.clear()
                 await self._room.wait()
+
+    def _sign_off(self) -> None:
+        totals, seconds = self.totals, self._loop.time() - self._opened
+        self._metrics.note_end(self._reason)
+        log.info(
+            "session ended: %s, after %.1f s, %d frames, %d estimates, %d rejected",
+            self._reason,
+            seconds,
+            totals.frames,
+            totals.estimates,
+            totals.rejected,
+            extra={**self._about, "reason": self._reason, "totals": totals.model_dump()},
+        )
+        about = {name: value for name, value in self._about.items() if value}
+        self._tracing.note_session(seconds, {**about, "reason": self._reason, **totals.model_dump()})
+
+    @property
+    def traffic(self) -> Traffic:
+        """What went over the wire so far."""
+        self._traffic.bytes_out = self._outbox.bytes_sent
+        self._traffic.superseded = self._outbox.superseded
+        return self._traffic
 
     @property
     def totals(self) -> Totals:
@@ -91,9 +153,20 @@ class Conversation:
         """The service stops: take no more frames, send the last checkpoints, and close with 1012 after them."""
         self._leaving = True
         if self._session.state is not SessionState.CLOSED:
-            self._outbox.put(self._codec.encode(GoingAway(seconds=seconds)))
+            self._say(GoingAway(seconds=seconds))
         self._carry_out(self._session.checkpoints())
         self._leave_when_done()
+
+    def send_away(self, retry_after: float) -> None:
+        """Close with 1013: there is more load than the service can bear; `retry_after` is in seconds."""
+        error = Overloaded("this service is late with its frames; resume elsewhere, or later", retry_after=retry_after)
+        self._end(error, "shed")
+
+    def _end(self, error: FervorError, reason: str) -> None:
+        """End the session with an error, for a reason that is not in its code."""
+        if self._session.state is not SessionState.CLOSED:
+            self._carry_out(self._session.refuse(error))
+            self._reason = reason
 
     def _leave_when_done(self) -> None:
         if self._leaving and not self._session.busy:
@@ -108,34 +181,66 @@ class Conversation:
             self._give_up(fault)
 
     def _understand(self, data: str | bytes) -> list[Event]:
+        """What a message brings. Whatever it is, it counts as a frame of the pace, at least."""
         try:
-            message = self._codec.decode_client(data)
-            self._pace.take(min(_frames_in(message), self._settings.max_frames_per_message), self._heard)
+            self._pace.take(1, self._heard)
+            message = self._decode(data)
+            if isinstance(message, Frames):
+                more = min(len(message.frames), self._settings.max_frames_per_message) - 1
+                self._pace.take(more, self._heard)
         except FervorError as error:
             return self._session.refuse(error)
+        if isinstance(message, SessionStart):
+            self._latest = message.delivery == "latest"
         return self._session.receive(message)
+
+    def _decode(self, data: str | bytes) -> ClientMessage:
+        try:
+            return self._codec.decode_client(data)
+        except MessageError:
+            self._pace.take(len(data) // BYTES_A_FRAME, self._heard)
+            raise
 
     def _carry_out(self, events: Iterable[Event]) -> None:
         """Do what the session asks, in its order."""
         for event in events:
             match event:
                 case Reply():
-                    self._outbox.put(self._codec.encode(event.message))
+                    self._say(event.message)
                 case Ticket():
                     self._unanswered += 1
+                    self._traffic.gaps += "held" in event.flags or "gap_reset" in event.flags
                     self._batcher.submit(event, self._deliver)
                 case Release():
                     self._batcher.release(event.slot)
                 case Restore():
                     self._restore(event)
                 case Close():
+                    self._reason = REASONS.get(event.code, event.reason)
                     self._outbox.put(event)
                     self._leave_soon()
                 case _:
                     assert_never(event)
         if self._outbox.full and self._session.state is not SessionState.CLOSED:
             self._outbox.drop()
-            self._carry_out(self._session.refuse(Overloaded("the client reads its answers too slowly")))
+            self._end(Overloaded("the client reads its answers too slowly"), "slow_reader")
+
+    def _say(self, message: ServerMessage) -> None:
+        """Send a message, in place of one that waits and says less."""
+        encoded = self._codec.encode(message)
+        topic: Hashable = None
+        match message:
+            case Estimate() if self._latest:
+                topic = ("estimate", message.body)
+            case Estimates() if self._latest:
+                topic = ("estimate", *(estimate.body for estimate in message.estimates))
+            case Checkpoint():
+                topic = ("checkpoint", message.body)
+                self._traffic.checkpoints += 1
+                self._traffic.checkpoint_bytes += len(encoded)
+            case SessionStarted():
+                self._traffic.resumed += len(message.resumed)
+        self._outbox.put(encoded, topic=topic)
 
     def _restore(self, event: Restore) -> None:
         try:
@@ -153,14 +258,14 @@ class Conversation:
             self._give_up(fault)
 
     def _give_up(self, fault: Exception) -> None:
-        log.error("session %s: failed", self._session.session_id, exc_info=fault)
+        self._log.error("the session failed", exc_info=fault)
         self._carry_out(self._session.refuse(FervorError("the service failed on this session; the fault is its own")))
 
     async def _send_all(self) -> None:
         try:
             await self._outbox.send_all()
-        except Exception:
-            log.exception("session %s: could not send", self._session.session_id)
+        except Exception as fault:  # noqa: BLE001  # it costs this session, and no other
+            self._log.error("could not send", exc_info=fault)
         self._leave_soon()
 
     def _leave_soon(self) -> None:
@@ -181,9 +286,3 @@ class Conversation:
             self._watch = self._loop.call_at(until, self._look)
         else:
             self._carry_out(self._session.refuse(error(sentence)))
-
-
-def _frames_in(message: ClientMessage) -> int:
-    if isinstance(message, Frames):
-        return len(message.frames)
-    return 1 if isinstance(message, Frame) else 0

@@ -20,11 +20,16 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     await service.probe.run()
     metadata = service.model.metadata
     log.info("model %s %s (%s)", metadata.name, metadata.version, metadata.purpose)
-    if not service.settings.checkpoint_keys:
+    if not (service.settings.checkpoint_keys or service.settings.checkpoint_keys_file):
         log.info("no FERVOR_CHECKPOINT_KEYS: streams survive a cut connection, but not a restart of this service")
-    lag = asyncio.create_task(service.metrics.watch_loop())
+    watches = [
+        asyncio.create_task(service.metrics.watch_loop()),
+        asyncio.create_task(service.shedding.run(service.drain)),
+    ]
     try:
         yield
     finally:
-        lag.cancel()
+        for watch in watches:
+            watch.cancel()
         await service.scoring.close()
+        service.tracing.close()

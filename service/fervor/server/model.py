@@ -11,7 +11,7 @@ from fervor.server.service import Service, service_of
 router = APIRouter(prefix="/v1", tags=["model"])
 
 
-@router.get("/model", responses=problem_responses(401))
+@router.get("/model", responses=problem_responses(401, 403))
 async def model(service: Annotated[Service, Depends(service_of)]) -> ModelDescription:
     """What the model is, what it was trained on and how well it does."""
     return describe_model(service.model)

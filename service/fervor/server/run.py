@@ -5,6 +5,7 @@ longer ready, streams get their last checkpoints and 1012, and what else is unde
 """
 
 import logging
+import resource
 import socket
 from contextlib import ExitStack
 
@@ -12,7 +13,10 @@ import uvicorn
 
 from fervor.errors import FervorError
 from fervor.server.app import create_app
+from fervor.server.http_protocol import GuardedHttp
+from fervor.server.logs import configure_logs
 from fervor.server.service import Service
+from fervor.server.websocket_protocol import GuardedWebSocket
 from fervor.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -20,7 +24,8 @@ log = logging.getLogger(__name__)
 STUCK_S = 20
 """Seconds after which the kernel gives up a connection whose peer takes no bytes."""
 
-FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
+OTHER_FILES = 256
+"""Open files of the process beside its connections: some of its own, and connections that are being refused."""
 
 
 class AddressError(FervorError):
@@ -54,7 +59,8 @@ def run(settings: Settings) -> None:
     Raises:
         FervorError: the model or the address can't be used.
     """
-    logging.basicConfig(level=settings.log_level.upper(), format=FORMAT)
+    configure_logs(settings.log_format, settings.log_level)
+    allow_files(settings.max_connections)
     with bind(settings.host, settings.port) as bound:
         Server(configure(settings)).run(sockets=[bound])
 
@@ -63,8 +69,8 @@ def configure(settings: Settings) -> uvicorn.Config:
     """How uvicorn serves the application."""
     return uvicorn.Config(
         create_app(settings),
-        http="httptools",
-        ws="websockets-sansio",
+        http=GuardedHttp,
+        ws=GuardedWebSocket,
         ws_max_size=settings.max_message_bytes,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=settings.shutdown_grace_s,
@@ -73,6 +79,17 @@ def configure(settings: Settings) -> uvicorn.Config:
         access_log=settings.log_level == "debug",
         server_header=False,
     )
+
+
+def allow_files(connections: int) -> None:
+    """Let the process have as many open files as its connections need, if the system lets it."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = connections + OTHER_FILES
+    allowed = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    if soft != resource.RLIM_INFINITY and soft < allowed:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
+    if allowed < wanted:
+        log.warning("the system allows %d open files; %d connections need %d", allowed, connections, wanted)
 
 
 def bind(host: str, port: int) -> socket.socket:

@@ -29,7 +29,7 @@ class SkeletonInfo(BaseModel):
     unseen: tuple[str, ...] = Field(description="joints of the rig C13 that it can't observe; they are masked")
 
 
-@router.get("/skeletons", responses=problem_responses(401))
+@router.get("/skeletons", responses=problem_responses(401, 403))
 async def skeletons(service: Annotated[Service, Depends(service_of)]) -> list[SkeletonInfo]:
     """The catalogue, and the calibrations kept on this service."""
     known: dict[str, Skeleton | Landmarks] = {**SKELETONS, **LANDMARKS, **service.host.skeletons}

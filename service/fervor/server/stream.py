@@ -16,6 +16,7 @@ from fervor.server.auth import TOKEN_SUBPROTOCOL
 from fervor.server.conversation import Conversation
 from fervor.server.problems import problem, problem_responses
 from fervor.server.service import Service, service_of
+from fervor.server.wire import StarletteWire
 
 router = APIRouter(prefix="/v1", tags=["stream"])
 
@@ -26,12 +27,12 @@ PATH = "/v1/stream"
 async def stream(websocket: WebSocket, service: Annotated[Service, Depends(service_of)]) -> None:
     """Follow bodies live."""
     codec, agreed = choose_codec(websocket.scope["subprotocols"])
-    with service.admitted(), suppress(WebSocketDisconnect):
+    with service.sessions.admitted(), suppress(WebSocketDisconnect):
         await websocket.accept(agreed)
-        await Conversation(websocket, service, codec).run()
+        await Conversation(StarletteWire(websocket), service, codec, client=websocket.state.client).run()
 
 
-@router.get("/stream", status_code=426, response_class=Response, responses=problem_responses(401, 426))
+@router.get("/stream", status_code=426, response_class=Response, responses=problem_responses(401, 403, 426))
 async def upgrade_required() -> Response:
     """The live stream is a WebSocket: ask for an upgrade, with a subprotocol of `fervor.v1.json`."""
     refusal = problem(426, f"{PATH} is a WebSocket; expected a request for an upgrade to it", "upgrade_required")
