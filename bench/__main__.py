@@ -1,96 +1,16 @@
-"""Prints what a frame costs, stage by stage, and what batching gains, on this machine now.
+"""`make bench`: the cost of a frame inside the service, then the service beside a naive one and the floor, quickly.
 
-Absolute times drift with the machine; the ratios, taken in turn within one run, are what to compare.
+`fervor bench` does the second part at length.
 """
 
-import time
-from collections.abc import Callable
+import sys
 
-import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from fervor.engine.engine import Engine
-from fervor.model import Model, default_model_path
-from fervor.session.body import Body, Terms
-from fervor.session.events import Pose, Source
-from fervor.skeletons.adapter import adapt
-from fervor.skeletons.catalog import SKELETONS, skeleton
-
-BATCHES = (1, 16, 64, 256)
-FRAMES = 120
-ROUNDS = 5
-
-
-def main() -> None:
-    """Run all and print two tables."""
-    model = Model.load(default_model_path())
-    console = Console()
-    console.print(_batching(model))
-    console.print(_adapting(model))
-
-
-def _batching(model: Model) -> Table:
-    table = Table(title="a 30 Hz frame, from session to estimate, one core")
-    for heading in ("bodies together", "µs a frame", "gain over one", "model alone, µs", "share of model"):
-        table.add_column(heading, justify="right")
-    alone = None
-    for bodies in BATCHES:
-        whole = _best(lambda bodies=bodies: _stream(model, bodies)) / (bodies * FRAMES) * 1e6
-        step = _best(lambda bodies=bodies: _steps(model, bodies)) / (bodies * FRAMES) * 1e6
-        alone = alone or whole
-        table.add_row(f"{bodies}", f"{whole:.1f}", f"x {alone / whole:.1f}", f"{step:.1f}", f"{step / whole:.0%}")
-    return table
-
-
-def _adapting(model: Model) -> Table:
-    step = _best(lambda: _steps(model, 256)) / FRAMES
-    table = Table(title="adapting 256 frames, against one model step for them")
-    for heading in ("skeleton", "joints", "µs", "of a step"):
-        table.add_column(heading, justify="right")
-    for name in SKELETONS:
-        known = skeleton(name)
-        rotations = _motion(256, len(known.joints))
-        observed = np.ones(rotations.shape[:2], np.bool_)
-        cost = _best(lambda: adapt(known, rotations, observed, axes=known.axes))  # noqa: B023
-        table.add_row(name, f"{len(known.joints)}", f"{cost * 1e6:.0f}", f"{cost / step:.0%}")
-    return table
-
-
-def _stream(model: Model, bodies: int) -> None:
-    known = skeleton("c13")
-    terms = Terms(model.metadata, Source(known, known.axes))
-    engine = Engine(model, capacity=bodies)
-    crowd = [Body(str(number), engine.claim(), terms) for number in range(bodies)]
-    poses = [Pose(rotations, np.ones(13, np.bool_)) for rotations in _motion(FRAMES, 13)]
-    for seq, pose in enumerate(poses):
-        tickets = [body.plan(seq, seq / 30.0, pose) for body in crowd]
-        for body, ticket, outcome in zip(crowd, tickets, engine.run(tickets), strict=True):
-            body.conclude(ticket, outcome)  # type: ignore[arg-type]  # the packaged model does not fail
-
-
-def _steps(model: Model, bodies: int) -> None:
-    rotations = np.tile(_motion(1, 13)[:, None].astype(np.float32), (bodies, 1, 1, 1))
-    mask, emotion = np.ones((bodies, 1, 13), np.float32), np.zeros((bodies, 1, 11), np.float32)
-    states = model.zero_states(bodies)
-    for _ in range(FRAMES):
-        states = model.run(rotations, mask, emotion, states).states
-
-
-def _motion(frames: int, joints: int) -> np.ndarray:
-    walk = np.random.default_rng(0).standard_normal((frames, joints, 4)) * 0.2 + np.array([0.0, 0.0, 0.0, 1.0])
-    return walk / np.linalg.norm(walk, axis=-1, keepdims=True)
-
-
-def _best(work: Callable[[], object]) -> float:
-    """Shortest of a few runs, seconds: the one the machine disturbed least."""
-    times = []
-    for _ in range(ROUNDS):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
+from fervor.cli.main import run
+from fervor_bench.frame_cost import frame_costs
 
 if __name__ == "__main__":
-    main()
+    for table in frame_costs():
+        Console().print(table)
+    sys.exit(run(["bench", "--quick", *sys.argv[1:]]))

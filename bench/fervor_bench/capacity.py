@@ -1,0 +1,65 @@
+"""The largest number of sessions that a contestant serves in time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+MOST_P99_MS = 10.0
+"""99 % of the frames must be answered within this: a third of a frame's interval at 30 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Capacity:
+    """How many sessions were kept."""
+
+    sessions: int
+    """Largest number seen kept; 0 where none was."""
+    bounded: bool
+    """Whether a number above it was seen to fail; else the generator or the limit ended the search."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a trial says of a number of sessions."""
+
+    keeps: bool
+    """The generator's lag is part of a latency, so what keeps with it would keep without."""
+    valid: bool
+    """A trial that fails proves nothing where the generator did."""
+
+
+def find_capacity(
+    judge: Callable[[int], Verdict], *, first: int, most: int, resolution: float = 0.05, attempts: int = 2
+) -> Capacity:
+    """Bracket the largest number that is kept, then halve the bracket.
+
+    Args:
+        judge: tries a number of sessions.
+        first: where to begin.
+        most: no more than so many.
+        resolution: of the answer, as a share of it.
+        attempts: a number fails when so many trials in a row fail: neighbours on the machine cost some.
+    """
+    low, high, valid, number = 0, most + 1, False, min(max(first, 1), most)
+    while True:
+        kept, sound = _try(judge, number, attempts)
+        if kept:
+            low = number
+        else:
+            high, valid = number, sound
+        if high - low <= max(1, int(resolution * low)):
+            return Capacity(low, bounded=valid and high <= most)
+        if high > most:
+            number = min(number * 2, most)
+        else:
+            number = (low + high) // 2 if low else max(high // 2, 1)
+
+
+def _try(judge: Callable[[int], Verdict], number: int, attempts: int) -> tuple[bool, bool]:
+    """Whether a number is kept, and whether any failure was sound."""
+    sound = False
+    for _ in range(attempts):
+        verdict = judge(number)
+        if verdict.keeps:
+            return True, True
+        sound = sound or verdict.valid
+    return False, sound

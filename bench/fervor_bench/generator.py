@@ -1,0 +1,129 @@
+"""The load generator as a process: started, ready, told to go, and asked what it saw."""
+
+import json
+import select
+import subprocess
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from fervor_bench.errors import BenchError
+from fervor_bench.machine import pinned
+
+Loop = Literal["open", "closed"]
+Arrivals = Literal["random", "lockstep"]
+
+CONNECT_S = 90.0
+"""Longest wait for all sessions to be started."""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """How much is sent, and when."""
+
+    sessions: int
+    loop: Loop = "open"
+    """`open`: every session keeps its own schedule; `closed`: it sends the next message when it has its answer."""
+    arrivals: Arrivals = "random"
+    """Open loop: schedules at random phases, or all at the same instants."""
+    warmup_s: float = 1.0
+    seconds: float = 5.0
+    """The window that is measured, after the warm-up."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What the generator saw in its window."""
+
+    sessions: int
+    """Open at the end."""
+    refused: int
+    closed: int
+    errors: int
+    first_error: str
+    frames: int
+    """Answered."""
+    unanswered: int
+    checkpoints: int
+    blocked: int
+    """How often a session could not send because the service did not read."""
+    dry: bool
+    """The script came to its end before the window did."""
+    window_s: float
+    cpu_s: float
+    """The generator's own processor time."""
+    latencies: npt.NDArray[np.float32]  # [frame] µs
+    lags: npt.NDArray[np.float32]  # [message] µs, how late the generator was; open loop
+
+
+class Generator:
+    """One run of `load`, its sessions started and idle until `run`.
+
+    As a context manager: whatever happens, the process is gone afterwards.
+    """
+
+    def __init__(
+        self, program: Path, script: Path, *, address: tuple[str, int], load: Load, processor: int, result: Path
+    ) -> None:
+        self._load = load
+        self._result = result
+        host, port = address
+        where = [str(program), host, str(port), str(script), str(result)]
+        how = [str(load.sessions), load.loop, load.arrivals, str(load.warmup_s), str(load.seconds)]
+        with pinned(processor):
+            self._process = subprocess.Popen(
+                [*where, *how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+            )  # no buffer: `select` must see every line that was not read
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def wait_until_ready(self) -> int:
+        """Wait for all sessions to be started; returns how many are.
+
+        Raises:
+            BenchError: none is; says what the service answered.
+        """
+        _, started, refused, *why = self._hear("ready", CONNECT_S).split(" ", 3)
+        if int(started) == 0:
+            raise BenchError(f"none of {refused} sessions could be started: {' '.join(why) or 'no answer'}")
+        return int(started)
+
+    def run(self, at_begin: Callable[[], None], at_end: Callable[[], None]) -> Seen:
+        """Send; the two callbacks are called at the edges of the measured window.
+
+        Raises:
+            BenchError: the generator ended before its time.
+        """
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(b"go\n")
+        patience = self._load.warmup_s + self._load.seconds + 30.0
+        if self._hear("", patience) == "begin":
+            at_begin()
+            self._hear("end", patience)
+        at_end()
+        told: dict[str, Any] = json.loads(self._hear("{", patience))
+        with self._result.open("rb") as file:
+            series = [np.fromfile(file, "<f4", int(np.fromfile(file, "<u8", 1)[0])) for _ in range(2)]
+        return Seen(**told, latencies=series[0], lags=series[1])
+
+    def _hear(self, beginning: str, seconds: float) -> str:
+        assert self._process.stdout is not None
+        readable, _, _ = select.select([self._process.stdout], [], [], seconds)
+        line = self._process.stdout.readline().decode().strip() if readable else ""
+        if not line or not line.startswith(beginning):
+            raise BenchError(f"the load generator said {line!r} where {beginning!r} was expected")
+        return line
