@@ -25,13 +25,13 @@ lint: $(VENV)/dev.stamp ## style, format, and the floors of the architecture
 	@$(BIN)/ruff format --check .
 	@$(BIN)/lint-imports
 
-types: $(VENV)/dev.stamp ## mypy --strict on the three packages
+types: $(VENV)/dev.stamp ## mypy --strict on the four packages
 	@$(BIN)/mypy
 
 audit: $(VENV)/audit.stamp ## ask PyPI for known holes in the pinned versions (not part of CI: needs PyPI itself)
 	@$(BIN)/pip-audit --strict --requirement constraints.txt --no-deps --disable-pip --vulnerability-service pypi
 
-bench: $(VENV)/dev.stamp ## speed, as ratios measured in one run
+bench: $(VENV)/dev.stamp ## speed, beside a naive service and a floor in C
 	@$(BIN)/python -m bench
 
 clean: ## forget the environment and everything made

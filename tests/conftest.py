@@ -1,6 +1,7 @@
 """What tests share: real motion, and a real service."""
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,6 +22,16 @@ def shared_data() -> Path:
             pytest.fail(f"{SHARED_DATA} is absent")
         pytest.skip("the folder with real motion is absent")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the C programs of bench are built once; skips where there is no compiler, except in CI."""
+    if shutil.which("cc") is None:
+        if os.environ.get("CI"):
+            pytest.fail("no C compiler is here")
+        pytest.skip("no C compiler is here")
+    return tmp_path_factory.mktemp("bench")
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ import typer
 from pydantic import BaseModel
 
 import fervor
+import fervor_bench
 import fervor_client
 from fervor.cli.commands import build_app, find_commands
 from fervor.errors import CloseCode, FervorError
@@ -202,7 +203,7 @@ def all_errors(root: type[FervorError] = FervorError) -> Iterator[type[FervorErr
 
 
 def test_errors_are_all_there() -> None:
-    for package in (fervor, fervor_client):
+    for package in (fervor, fervor_client, fervor_bench):
         for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             if not found.name.endswith("scoring_worker"):
                 importlib.import_module(found.name)

@@ -48,10 +48,7 @@ def find_capacity(
             high, valid = number, sound
         if high - low <= max(1, int(resolution * low)):
             return Capacity(low, bounded=valid and high <= most)
-        if high > most:
-            number = min(number * 2, most)
-        else:
-            number = (low + high) // 2 if low else max(high // 2, 1)
+        number = min(number * 2, most) if high > most else max((low + high) // 2, 1)
 
 
 def _try(judge: Callable[[int], Verdict], number: int, attempts: int) -> tuple[bool, bool]:

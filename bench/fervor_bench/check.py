@@ -68,7 +68,8 @@ def _expected(traffic: Traffic) -> npt.NDArray[np.float64]:
     model = Model.load(default_model_path())
     rotations = traffic.motion(0)[None, :FRAMES]  # [1, frame, joint, 4]
     emotion = np.zeros((1, FRAMES, len(EMOTIONS)), np.float32)
-    emotion[..., EMOTIONS.index(traffic.emotion)] = 1.0
+    if traffic.emotion in EMOTIONS:
+        emotion[..., EMOTIONS.index(traffic.emotion)] = 1.0
     mask = np.ones((1, FRAMES, len(JOINTS)), np.float32)
     outputs = model.run(rotations, mask, emotion, model.zero_states(1))
     return np.asarray(outputs.intensity[0], np.float64)

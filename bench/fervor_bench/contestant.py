@@ -12,12 +12,10 @@ from http.client import HTTPConnection, HTTPException
 from pathlib import Path
 
 from fervor.emotions import EMOTIONS
-from fervor.model import default_model_path
 from fervor_bench.errors import BenchError
 from fervor_bench.machine import pinned
 from fervor_bench.native import build
 from fervor_bench.traffic import Encoding
-from fervor_bench.weights import write_weights
 
 HOST = "127.0.0.1"
 
@@ -49,6 +47,8 @@ class Contestant:
 
 
 def _naive(_: Path, port: int) -> list[str]:
+    from fervor.model import default_model_path
+
     return [sys.executable, "-m", "fervor_bench.naive", str(port), str(default_model_path())]
 
 
@@ -61,6 +61,9 @@ def _fervor(_: Path, port: int) -> list[str]:
 
 
 def _floor(folder: Path, port: int) -> list[str]:
+    from fervor.model import default_model_path
+    from fervor_bench.weights import write_weights
+
     weights = folder / "weights"
     write_weights(default_model_path(), weights)
     return [str(build("floor", folder)), str(port), str(weights), *EMOTIONS]

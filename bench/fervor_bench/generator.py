@@ -48,8 +48,9 @@ class Seen:
     errors: int
     first_error: str
     frames: int
-    """Answered."""
+    """Answered in the window."""
     unanswered: int
+    """Frames due in the window that have no answer one second after it; open loop."""
     checkpoints: int
     blocked: int
     """How often a session could not send because the service did not read."""
@@ -58,7 +59,7 @@ class Seen:
     window_s: float
     cpu_s: float
     """The generator's own processor time."""
-    latencies: npt.NDArray[np.float32]  # [frame] µs
+    latencies: npt.NDArray[np.float32]  # [frame] µs, of the frames due (open loop) or answered in the window
     lags: npt.NDArray[np.float32]  # [message] µs, how late the generator was; open loop
 
 

@@ -1,6 +1,6 @@
 """What one run of `fervor bench` measures."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from fervor_bench.contestant import CONTESTANTS, Contestant
@@ -17,7 +17,7 @@ class Plan:
 
     contestants: tuple[str, ...] = tuple(CONTESTANTS)
     encoding: Encodings = "both"
-    traffic: Traffic = Traffic()
+    traffic: Traffic = field(default_factory=Traffic)
     sessions: tuple[int, ...] = (1, 100, 300, 1000)
     """Numbers of sessions to try one by one."""
     loop: Loop = "open"

@@ -188,7 +188,7 @@ int main(int count, char **words) {
   printf("{\"sessions\": %d, \"refused\": %d, \"closed\": %d, \"errors\": %lu, \"first_error\": \"%s\", "
          "\"frames\": %lu, \"unanswered\": %lu, \"checkpoints\": %lu, \"blocked\": %lu, \"dry\": %s, "
          "\"window_s\": %.6f, \"cpu_s\": %.6f}\n",
-         tally.live, tally.refused, tally.closed, tally.errors, tally.first_error, tally.counted, count_unanswered(),
+         tally.live, tally.refused, tally.closed, tally.errors, tally.first_error, tally.in_window, count_unanswered(),
          tally.checkpoints, tally.blocked, tally.dry ? "true" : "false", end_s - begin_s, used);
   return 0;
 }

@@ -39,7 +39,7 @@ static double start_s, begin_s, end_s, interval_s;
 static uint32_t group;  // messages of a session that are due together
 static struct series latencies, lags;
 static struct {
-  uint64_t sent, answered, counted, checkpoints, errors, blocked;
+  uint64_t sent, answered, in_window, counted, checkpoints, errors, blocked;
   int live, refused, closed;
   bool dry;
   char first_error[256];
@@ -127,6 +127,7 @@ static void on_answer(struct session *session, uint64_t seq, double now) {
     return;
   }
   tally.answered++;
+  tally.in_window += now >= begin_s && now < end_s;
   double from = open_loop ? due_s(session, message) : session->sent_at;
   double at = open_loop ? from : now;
   if (at >= begin_s && at < end_s) {

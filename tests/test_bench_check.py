@@ -1,0 +1,56 @@
+"""Whoever computes something else is not measured; floor and naive service compute what the model does."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import speaking
+from fervor.model import default_model_path
+from fervor_bench.check import check_estimates
+from fervor_bench.contestant import CONTESTANTS, Running, started
+from fervor_bench.errors import BenchError
+from fervor_bench.machine import choose_places
+from fervor_bench.traffic import Traffic
+from fervor_bench.weights import write_weights
+from fervor_export.network import NetworkConfig
+from networks import model_bytes
+
+PLAIN = Traffic(checkpoints=False)
+
+
+def test_estimates_of_another_model_are_refused() -> None:
+    with speaking.speaking() as running, pytest.raises(BenchError, match="estimates differ from the model's by 0"):
+        check_estimates(running, PLAIN)
+
+
+@pytest.mark.parametrize("encoding", ["json", "msgpack"])
+def test_the_service_passes(live, encoding) -> None:
+    host, port = live.address.split(":")
+    assert check_estimates(Running(host, int(port)), replace(PLAIN, encoding=encoding)) < 1e-5
+
+
+@pytest.mark.parametrize("name", ["naive", "naive-tuned", "floor"])
+@pytest.mark.parametrize("emotion", ["joy", "sadness", "unknown"])
+def test_others_compute_what_the_model_does(workshop: Path, name: str, emotion: str) -> None:
+    contestant = CONTESTANTS[name]
+    traffic = replace(PLAIN, encoding=contestant.encodings[0], emotion=emotion)
+    with started(contestant, workshop, choose_places().server) as running:
+        assert check_estimates(running, traffic) < 1e-4
+        assert running.start_s is not None
+
+
+def test_a_network_that_the_floor_does_not_know_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "euler.onnx"
+    path.write_bytes(model_bytes(NetworkConfig(features="euler")))
+    with pytest.raises(BenchError, match="floor knows networks with features rot6d"):
+        write_weights(path, tmp_path / "weights")
+
+
+def test_weights_are_as_many_as_the_floor_reads(tmp_path: Path) -> None:
+    write_weights(default_model_path(), tmp_path / "weights")
+    one, two, head = (130 + 64 + 1) * 4 * 64, (64 + 128 + 1) * 4 * 128, 12 * (128 + 1)
+    values = np.fromfile(tmp_path / "weights", "<f4")
+    assert len(values) == 1 + one + two + head
+    assert values[0] == np.float32(6.0)  # 2 · 30 Hz · 0.1

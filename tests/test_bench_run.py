@@ -1,0 +1,152 @@
+"""Whole runs, as short as they can be: what is printed, written and refused. No figure is judged."""
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from fervor.errors import InputError
+from fervor_bench.errors import BenchError
+from fervor_bench.machine import Places, choose_places
+from fervor_bench.plan import QUICK, Plan
+from fervor_bench.plot import plot
+from fervor_bench.report import show
+from fervor_bench.run import measure_all, measure_url, running_at
+from fervor_bench.traffic import Traffic
+from program import fervor
+
+TINY = Plan(
+    contestants=("naive-tuned", "fervor", "floor"),
+    encoding="msgpack",
+    sessions=(1, 3),
+    seconds=0.4,
+    saturated=2,
+    idle=4,
+    most_sessions=2,
+    attempts=1,
+)
+
+
+def quiet(_: str) -> None:
+    """Progress is for people."""
+
+
+def shown(results) -> str:
+    console = Console(width=140, record=True, file=io.StringIO())
+    show(console, results)
+    return console.export_text()
+
+
+def test_service_and_floor_are_measured_side_by_side(workshop: Path, tmp_path: Path) -> None:
+    results = measure_all(TINY, stages=True, scoring=True, told=quiet)
+    assert [standing.name for standing in results.standings] == ["fervor, msgpack", "floor, msgpack"]
+    for standing in results.standings:
+        assert standing.difference is not None
+        assert standing.difference <= 1e-4
+        assert standing.idle_kib is not None
+        assert standing.saturated is not None
+        assert standing.saturated.frames_per_second > 0
+        assert [trial.load.sessions for trial in standing.trials] == [1, 3]
+        assert all(not trial.failures for trial in standing.trials)
+    assert sum(stage.share for stage in results.breakdowns[0].stages) == pytest.approx(1.0)
+    assert {rate.kind for rate in results.rates} == {"NPZ", "JSON"}
+    text = shown(results)
+    for word in ("fervor, msgpack", "floor, msgpack", "of floor", "stages of a frame", "scoring over HTTP", "NPZ"):
+        assert word in text
+    results.write(tmp_path / "results.json")
+    written = json.loads((tmp_path / "results.json").read_text())
+    assert written["plan"]["sessions"] == [1, 3]
+    assert written["standings"][1]["contestant"] == "floor"
+    plot(results, tmp_path / "plot.png")
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_running_service_is_measured_from_outside(live, workshop: Path) -> None:
+    results = measure_url(f"ws://{live.address}", TINY, token="", told=quiet)
+    (standing,) = results.standings
+    assert standing.contestant == f"ws://{live.address}"
+    assert standing.saturated is not None
+    assert standing.saturated.server_us is None
+    assert "ws://" in shown(results)
+
+
+def test_a_service_with_a_token_wants_it(start_service, workshop: Path) -> None:
+    live = start_service(tokens="let-me-in-please")
+    with pytest.raises(BenchError, match=r"401|403"):
+        measure_url(f"ws://{live.address}", TINY, token="", told=quiet)
+    results = measure_url(f"ws://{live.address}", TINY, token="let-me-in-please", told=quiet)
+    assert not results.standings[0].trials[0].failures
+
+
+def test_who_can_not_run_here_costs_no_other_its_place(workshop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise BenchError("no C compiler")
+
+    monkeypatch.setattr("fervor_bench.weights.write_weights", refuse)
+    plan = Plan(
+        contestants=("fervor", "floor"), encoding="msgpack", sessions=(1,), seconds=0.3, idle=0, most_sessions=0
+    )
+    results = measure_all(plan, stages=False, scoring=False, told=quiet)
+    assert [standing.contestant for standing in results.standings] == ["fervor"]
+    assert results.left_out == ["floor, msgpack: not measured: no C compiler"]
+    assert "not measured" in shown(results)
+
+
+def test_nobody_left_to_measure_is_an_error() -> None:
+    plan = Plan(contestants=("naive",), encoding="msgpack")
+    with pytest.raises(BenchError, match="no contestant speaks msgpack"):
+        measure_all(plan, stages=False, scoring=False, told=quiet)
+
+
+def test_a_contestant_that_is_not_known_is_refused() -> None:
+    with pytest.raises(BenchError, match="contestant fast is not known; expected some of naive, naive-tuned, fervor"):
+        Plan(contestants=("fast",))
+
+
+def test_a_simple_contestant_takes_simple_traffic() -> None:
+    with pytest.raises(BenchError, match="naive takes 13 joints and one frame a message"):
+        Plan(contestants=("naive",), traffic=Traffic(joints=25)).entries()
+    both = Plan(contestants=("fervor", "floor"), encoding="msgpack", traffic=Traffic(frames_per_message=4)).entries()
+    assert [traffic.checkpoints for _, traffic in both] == [True, False]
+
+
+def test_the_quick_plan_has_service_naive_and_floor() -> None:
+    assert {contestant.name for contestant, _ in QUICK.entries()} == {"naive-tuned", "fervor", "floor"}
+
+
+@pytest.mark.parametrize("url", ["wss://robot.local", "robot.local:80", "ws://", "ws://robot.local:port"])
+def test_an_address_that_can_not_be_used_is_refused(url: str) -> None:
+    with pytest.raises(InputError, match="expected ws://HOST:PORT"):
+        running_at(url, "")
+
+
+def test_addresses_have_the_streams_path_unless_they_say_otherwise() -> None:
+    assert running_at("ws://robot.local:8080", "").url == "ws://robot.local:8080/v1/stream"
+    assert running_at("ws://robot.local/live/v1/stream", "").url == "ws://robot.local:80/live/v1/stream"
+
+
+def test_one_processor_is_not_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {3})
+    with pytest.raises(BenchError, match="need a processor each"):
+        choose_places()
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 3, 7})
+    assert choose_places() == Places(server=7, generator=3)
+
+
+def test_the_command_prints_and_writes(workshop: Path, tmp_path: Path) -> None:
+    out = tmp_path / "results"
+    said = fervor(
+        *("bench", "--contestants", "floor", "--sessions", "2", "--seconds", "0.3"),
+        *("--idle", "0", "--most-sessions", "0", "--out", out),
+    )
+    assert said.returncode == 0, said.stderr
+    assert "floor, msgpack" in said.stdout
+    assert {path.name for path in out.iterdir()} == {"results.json", "plot.png"}
+
+
+def test_numbers_that_are_none_are_refused() -> None:
+    said = fervor("bench", "--sessions", "1,many")
+    assert said.returncode == 2
+    assert "expected numbers from 1 to 20000" in said.stderr

@@ -1,0 +1,74 @@
+"""What makes a trial count."""
+
+import numpy as np
+import pytest
+
+from fervor_bench.generator import Load, Seen
+from fervor_bench.traffic import Traffic
+from fervor_bench.trial import MOST_MESSAGES, Used, conclude, messages_needed
+
+
+def seen(**changes) -> Seen:
+    fields = {
+        "sessions": 10,
+        "refused": 0,
+        "closed": 0,
+        "errors": 0,
+        "first_error": "",
+        "frames": 1000,
+        "unanswered": 0,
+        "checkpoints": 0,
+        "blocked": 0,
+        "dry": False,
+        "window_s": 2.0,
+        "cpu_s": 0.2,
+        "latencies": np.full(1000, 500, np.float32),
+        "lags": np.full(1000, 20, np.float32),
+    }
+    return Seen(**(fields | changes))
+
+
+def test_costs_are_processor_time_by_frames() -> None:
+    trial = conclude(Load(10), seen(), Used(server_s=0.5, busy_s=0.6))
+    assert (trial.server_us, trial.server_share, trial.frames_per_second) == (500.0, 0.25, 500.0)
+    assert trial.others_share == pytest.approx(0.05)
+    assert trial.valid
+    assert trial.keeps(10.0)
+    assert not trial.keeps(0.5)
+
+
+def test_a_service_elsewhere_has_no_costs() -> None:
+    trial = conclude(Load(10), seen(), None)
+    assert trial.server_us is trial.server_share is trial.others_share is None
+
+
+@pytest.mark.parametrize(
+    ("load", "changes", "used", "objection"),
+    [
+        (Load(10), {"lags": np.full(1000, 1500, np.float32)}, Used(1.0, 1.0), "lagged"),
+        (Load(10), {"cpu_s": 1.96}, Used(1.0, 1.0), "98% of its processor"),
+        (Load(10), {}, Used(1.0, 1.5), "others used 25% of the contestant's processor"),
+        (Load(10, arrivals="lockstep"), {"lags": np.full(1000, 11000, np.float32)}, Used(1.0, 1.0), "lagged"),
+    ],
+)
+def test_what_the_contestant_is_not_to_blame_for_is_objected_to(load, changes, used, objection) -> None:
+    trial = conclude(load, seen(**changes), used)
+    assert not trial.valid
+    assert objection in trial.objections[0]
+
+
+def test_lockstep_and_closed_loops_are_judged_by_their_own_measure() -> None:
+    assert conclude(Load(10, arrivals="lockstep"), seen(lags=np.full(1000, 1500, np.float32)), None).valid
+    assert conclude(Load(10, loop="closed"), seen(cpu_s=1.99, lags=np.zeros(0, np.float32)), None).valid
+
+
+@pytest.mark.parametrize("changes", [{"refused": 1}, {"closed": 1}, {"errors": 1}, {"frames": 0}])
+def test_sessions_that_were_not_served_are_failures(changes) -> None:
+    assert not conclude(Load(10), seen(**changes), None).keeps(1e9)
+
+
+def test_messages_last_for_the_whole_run() -> None:
+    assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic()) == 6 * 30 + 1
+    assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic(frames_per_message=6)) == 31
+    assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic(bodies=4)) == 6 * 30 * 4 + 4
+    assert messages_needed(Load(1, loop="closed"), Traffic()) == MOST_MESSAGES
