@@ -11,8 +11,10 @@ from fervor.model import default_model_path
 from fervor_bench.check import check_estimates
 from fervor_bench.contestant import CONTESTANTS, Running, started
 from fervor_bench.errors import BenchError
+from fervor_bench.generator import Load
 from fervor_bench.machine import choose_places
 from fervor_bench.traffic import Traffic
+from fervor_bench.trial import Track
 from fervor_bench.weights import write_weights
 from fervor_export.network import NetworkConfig
 from networks import model_bytes
@@ -39,6 +41,21 @@ def test_others_compute_what_the_model_does(workshop: Path, name: str, emotion: 
     with started(contestant, workshop, choose_places().server) as running:
         assert check_estimates(running, traffic) < 1e-4
         assert running.start_s is not None
+
+
+@pytest.mark.parametrize("frames", [4, 20])
+def test_the_floor_takes_several_frames_a_message(workshop: Path, frames: int) -> None:
+    with started(CONTESTANTS["floor"], workshop, choose_places().server) as running:
+        assert check_estimates(running, replace(PLAIN, frames_per_message=frames)) < 1e-4
+
+
+def test_the_floor_follows_several_bodies(workshop: Path) -> None:
+    places = choose_places()
+    with started(CONTESTANTS["floor"], workshop, places.server) as running:
+        track = Track(workshop, places, replace(PLAIN, bodies=4))
+        trial = track.run(running, Load(3, warmup_s=0.2, seconds=0.5))
+    assert trial.unanswered == 0
+    assert trial.failures == ()
 
 
 def test_a_network_that_the_floor_does_not_know_is_refused(tmp_path: Path) -> None:

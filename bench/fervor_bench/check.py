@@ -1,7 +1,6 @@
 """Whether a contestant computes what the model does; one that does not is not measured."""
 
 import json
-from itertools import islice
 from typing import Any
 
 import msgpack
@@ -28,7 +27,7 @@ def check_estimates(running: Running, traffic: Traffic) -> float:
 
     Args:
         running: the contestant.
-        traffic: of one body of the rig's 13 joints, one frame a message.
+        traffic: of one body of the rig's 13 joints, a divisor of `FRAMES` frames a message.
 
     Raises:
         BenchError: they differ by more than `TOLERANCE`, or there are none.
@@ -48,12 +47,12 @@ def _answered(running: Running, traffic: Traffic) -> npt.NDArray[np.float64]:
     with connect(
         running.url, subprotocols=[Subprotocol(traffic.subprotocol)], additional_headers=headers, compression=None
     ) as socket:
-        for payload in (traffic.encode(traffic.start()), *islice(traffic.payloads(0, FRAMES), FRAMES)):
+        for payload in (traffic.encode(traffic.start()), *traffic.payloads(0, FRAMES // traffic.frames_per_message)):
             socket.send(payload.decode() if traffic.encoding == "json" else payload)
         while len(intensities) < FRAMES:
             message = _decoded(socket.recv(timeout=10.0))
-            if message["type"] == "estimate":
-                intensities.append(message["intensity"])
+            if message["type"] in ("estimate", "estimates"):
+                intensities += [estimate["intensity"] for estimate in message.get("estimates", [message])]
             elif message["type"] == "error":
                 raise BenchError(f"a frame was refused: {message['message']}")
     return np.array(intensities)

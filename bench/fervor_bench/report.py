@@ -15,8 +15,8 @@ from fervor_bench.trial import Trial
 
 NONE = "-"
 
-TRIAL = ("sessions", "p50, ms", "p99, ms", "p99.9, ms", "frames/s", "processor", "generator", "lag p99, ms", "")
-"""Headings of `_trial_cells`."""
+TRIAL = ("sessions", "p50", "p99", "p99.9", "frames/s", "processor", "generator", "lag p99", "")
+"""Headings of `_trial_cells`; times in ms, shares of the contestant's and the generator's processor."""
 
 NAIVE = ("naive", "naive-tuned")
 """What ratios are taken to: the first of them that was measured."""
@@ -45,7 +45,15 @@ def _tables(results: Results) -> Iterator[Table | Text]:
 
 
 def _costs(standings: Sequence[Standing]) -> Table:
-    headings = ("processor time, µs", "x naive", "of floor", "frames/s", "idle session, KiB", "ready after, s")
+    headings = (
+        "processor time, µs",
+        "x naive",
+        "of floor",
+        "frames/s",
+        "generator",
+        "idle session, KiB",
+        "ready after, s",
+    )
     table = _table("a frame, saturated", "contestant", *headings)
     naive, floor = _yardsticks(standings)
     for standing in standings:
@@ -56,6 +64,7 @@ def _costs(standings: Sequence[Standing]) -> Table:
             _ratio(_cost(naive), cost),
             _share(_cost(floor), cost),
             _number(saturated.frames_per_second, 0) if saturated else NONE,
+            _percent(saturated.generator_share) if saturated else NONE,
             _number(standing.idle_kib),
             _number(standing.start_s, 2),
         )
@@ -94,7 +103,7 @@ def _latencies(results: Results) -> Table:
         "lag, ms",
         "",
     )
-    table = _table(f"latency by number of sessions ({how}, {results.plan.traffic.rate_hz:g} Hz)", *headings)
+    table = _table(f"latency, ms, by number of sessions ({how}, {results.plan.traffic.rate_hz:g} Hz)", *headings)
     for standing in results.standings:
         for trial in standing.trials:
             table.add_row(standing.name, *_trial_cells(trial))
@@ -131,7 +140,7 @@ def _rates(rates: Sequence[Rate]) -> Table:
 
 
 def _beside(beside: Beside) -> Table:
-    title = f"live sessions beside a client that scores without pause ({beside.requests} requests meanwhile)"
+    title = f"latency, ms, of live sessions beside a client that scores without pause ({beside.requests} requests meanwhile)"
     table = _table(title, "", *TRIAL)
     table.add_row("alone", *_trial_cells(beside.alone))
     table.add_row("beside scoring", *_trial_cells(beside.beside))
@@ -141,7 +150,7 @@ def _beside(beside: Beside) -> Table:
 def _table(title: str, *headings: str) -> Table:
     table = Table(title=title, title_justify="left")
     for number, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if number else "left")
+        table.add_column(heading, justify="right" if number else "left", no_wrap=not number)
     return table
 
 
