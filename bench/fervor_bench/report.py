@@ -133,14 +133,17 @@ def _stages(breakdown: Breakdown) -> Table:
 
 
 def _rates(rates: Sequence[Rate]) -> Table:
-    table = _table("scoring over HTTP, one processor", "body", "sequences", "frames each", "frames/s")
+    headings = ("sequences", "frames each", "processor time, µs a frame", "frames/s")
+    table = _table("scoring over HTTP, one processor", "body", *headings)
     for rate in rates:
-        table.add_row(rate.kind, f"{rate.sequences}", f"{rate.frames}", f"{rate.frames_per_second:,.0f}")
+        table.add_row(
+            rate.kind, f"{rate.sequences}", f"{rate.frames}", _number(rate.server_us), f"{rate.frames_per_second:,.0f}"
+        )
     return table
 
 
 def _beside(beside: Beside) -> Table:
-    title = f"latency, ms, of live sessions beside a client that scores without pause ({beside.requests} requests meanwhile)"
+    title = f"latency, ms, of live sessions beside a client that scores without pause ({beside.requests} requests)"
     table = _table(title, "", *TRIAL)
     table.add_row("alone", *_trial_cells(beside.alone))
     table.add_row("beside scoring", *_trial_cells(beside.beside))

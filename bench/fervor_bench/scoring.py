@@ -14,6 +14,7 @@ from fervor_bench.errors import BenchError
 from fervor_bench.generator import Load
 from fervor_bench.traffic import CYCLE, Traffic
 from fervor_bench.trial import Track, Trial
+from fervor_bench.usage import family_cpu_seconds
 
 SEQUENCES = 8
 
@@ -32,6 +33,8 @@ class Rate:
     """In a sequence."""
     frames_per_second: float
     """On the one processor that the service has, parsing and answer included."""
+    server_us: float
+    """Processor time a frame of service and scoring process, microseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +78,17 @@ REQUESTS = {"NPZ": npz_request, "JSON": json_request}
 
 def measure_rates(running: Running, seconds: float) -> list[Rate]:
     """Score requests of each kind, one after the other, for so many seconds each."""
+    assert running.pid is not None
     rates = []
     for kind, make in REQUESTS.items():
         request = make()
         _score(running, *request)  # the first one starts the scoring process
-        begin, requests = time.perf_counter(), 0
+        begin, used, requests = time.perf_counter(), family_cpu_seconds(running.pid), 0
         while (taken := time.perf_counter() - begin) < seconds or not requests:
             _score(running, *request)
             requests += 1
-        rates.append(Rate(kind, SEQUENCES, CYCLE, requests * SEQUENCES * CYCLE / taken))
+        used, scored = family_cpu_seconds(running.pid) - used, requests * SEQUENCES * CYCLE
+        rates.append(Rate(kind, SEQUENCES, CYCLE, scored / taken, used / scored * 1e6))
     return rates
 
 

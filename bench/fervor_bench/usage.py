@@ -13,6 +13,12 @@ def cpu_seconds(pid: int) -> float:
     return (int(after_name[11]) + int(after_name[12])) / TICKS
 
 
+def family_cpu_seconds(pid: int) -> float:
+    """Processor time of a process and of the children that it has now, seconds."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
+    return cpu_seconds(pid) + sum(cpu_seconds(int(child)) for child in children)
+
+
 def resident_kib(pid: int) -> int:
     """Resident memory of a process, KiB."""
     for line in Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():
