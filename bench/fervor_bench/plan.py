@@ -74,8 +74,8 @@ class Plan:
 QUICK = Plan(
     contestants=("naive-tuned", "fervor", "floor"),
     sessions=(1,),
-    seconds=1.0,
-    idle=200,
+    seconds=0.8,
+    idle=100,
     most_sessions=4000,
     resolution=0.25,
     attempts=1,

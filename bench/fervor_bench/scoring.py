@@ -17,6 +17,7 @@ from fervor_bench.trial import Track, Trial
 from fervor_bench.usage import family_cpu_seconds
 
 SEQUENCES = 8
+"""In a request."""
 
 MOTION = Traffic()
 """Whose motions are scored: 13 joints at 30 Hz."""
@@ -47,7 +48,7 @@ class Beside:
     """Scored meanwhile."""
 
 
-def npz_request(sequences: int = SEQUENCES) -> tuple[str, bytes, str]:
+def npz_request(sequences: int) -> tuple[str, bytes, str]:
     """Target, body and content type of a request with one NPZ file a sequence."""
     boundary = "fervor-bench"
     parts = []
@@ -60,7 +61,7 @@ def npz_request(sequences: int = SEQUENCES) -> tuple[str, bytes, str]:
     return "/v1/score/file", body, f"multipart/form-data; boundary={boundary}"
 
 
-def json_request(sequences: int = SEQUENCES) -> tuple[str, bytes, str]:
+def json_request(sequences: int) -> tuple[str, bytes, str]:
     """Target, body and content type of the same as JSON."""
     taken = [
         {
@@ -76,28 +77,28 @@ def json_request(sequences: int = SEQUENCES) -> tuple[str, bytes, str]:
 REQUESTS = {"NPZ": npz_request, "JSON": json_request}
 
 
-def measure_rates(running: Running, seconds: float) -> list[Rate]:
+def measure_rates(running: Running, seconds: float, sequences: int = SEQUENCES) -> list[Rate]:
     """Score requests of each kind, one after the other, for so many seconds each."""
     assert running.pid is not None
     rates = []
     for kind, make in REQUESTS.items():
-        request = make()
+        request = make(sequences)
         _score(running, *request)  # the first one starts the scoring process
         begin, used, requests = time.perf_counter(), family_cpu_seconds(running.pid), 0
         while (taken := time.perf_counter() - begin) < seconds or not requests:
             _score(running, *request)
             requests += 1
-        used, scored = family_cpu_seconds(running.pid) - used, requests * SEQUENCES * CYCLE
-        rates.append(Rate(kind, SEQUENCES, CYCLE, scored / taken, used / scored * 1e6))
+        used, scored = family_cpu_seconds(running.pid) - used, requests * sequences * CYCLE
+        rates.append(Rate(kind, sequences, CYCLE, scored / taken, used / scored * 1e6))
     return rates
 
 
-def measure_beside(running: Running, track: Track, load: Load) -> Beside:
+def measure_beside(running: Running, track: Track, load: Load, sequences: int = SEQUENCES) -> Beside:
     """A load alone, then beside a client that scores NPZ files without pause."""
     alone = track.run(running, load)
     stop = threading.Event()
     requests: list[int] = []
-    request = npz_request()
+    request = npz_request(sequences)
 
     def score_on() -> None:
         while not stop.is_set():
