@@ -2,7 +2,6 @@
 
 import os
 import platform
-import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -76,12 +75,6 @@ def pinned(processor: int) -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, before)
-
-
-def compiler_version(compiler: str) -> str:
-    """The first line that a C compiler says of itself."""
-    told = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True)
-    return told.stdout.partition("\n")[0]
 
 
 def _processor() -> str:

@@ -72,7 +72,7 @@ def _costs(standings: Sequence[Standing]) -> Table:
 
 
 def _capacities(standings: Sequence[Standing]) -> Table:
-    title = f"most sessions with 99 % of the frames answered within {MOST_P99_MS:g} ms"
+    title = f"most sessions, 99 % within {MOST_P99_MS:g} ms"
     table = _table(title, "contestant", "sessions", "x naive", "of floor")
     naive, floor = (_sessions(standing) for standing in _yardsticks(standings))
     for standing in standings:
@@ -90,20 +90,8 @@ def _yardsticks(standings: Sequence[Standing]) -> tuple[Standing | None, Standin
 def _latencies(results: Results) -> Table:
     how = f"{results.plan.loop} loop"
     if results.plan.loop == "open":
-        how += f", {results.plan.arrivals} arrivals"
-    headings = (
-        "contestant",
-        "sessions",
-        "p50, ms",
-        "p99",
-        "p99.9",
-        "frames/s",
-        "processor",
-        "generator",
-        "lag, ms",
-        "",
-    )
-    table = _table(f"latency, ms, by number of sessions ({how}, {results.plan.traffic.rate_hz:g} Hz)", *headings)
+        how += f", {results.plan.arrivals} arrivals, {results.plan.traffic.rate_hz:g} Hz"
+    table = _table(f"latency, ms, by number of sessions ({how})", "contestant", *TRIAL)
     for standing in results.standings:
         for trial in standing.trials:
             table.add_row(standing.name, *_trial_cells(trial))
@@ -188,7 +176,7 @@ def _counted(capacity: Capacity | None) -> str:
 def _number(value: float | None, digits: int = 1) -> str:
     if value is None:
         return NONE
-    return f"{value:,.{digits}f}" if math.isfinite(value) else "unanswered"
+    return f"{value:,.{digits}f}" if math.isfinite(value) else "never"
 
 
 def _percent(value: float | None) -> str:

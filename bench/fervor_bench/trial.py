@@ -187,7 +187,7 @@ def _objections(load: Load, lag_ms: float, share: float, others: float) -> list[
     most_ms = MOST_LOCKSTEP_LAG_MS if load.arrivals == "lockstep" else MOST_LAG_MS
     if lag_ms > most_ms:
         told.append(
-            f"the generator lagged: 1 % of its messages left more than {lag_ms:.1f} ms late, {most_ms:g} at most"
+            f"the generator lagged: 1 % of its messages left {lag_ms:.1f} ms late or more; expected {most_ms:g}"
         )
     if share > MOST_SHARE and load.loop == "open":  # closed: `generator_share` says who waited for whom
         told.append(f"the generator used {share:.0%} of its processor")
