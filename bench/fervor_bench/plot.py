@@ -44,3 +44,4 @@ def _costs(axes: Axes, results: Results) -> None:
     axes.set_yticks(list(places), [name for name, _ in bars])
     axes.invert_yaxis()
     axes.set(xscale="log", xlabel="µs of processor time a frame, saturated")
+    axes.set_xlim(left=1.0)
