@@ -50,7 +50,7 @@ class Seen:
     frames: int
     """Answered in the window."""
     unanswered: int
-    """Frames due in the window that have no answer one second after it; open loop."""
+    """Frames due in the window that have no answer two seconds after it; open loop."""
     checkpoints: int
     blocked: int
     """How often a session could not send because the service did not read."""

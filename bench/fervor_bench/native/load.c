@@ -16,7 +16,7 @@
 #include "session.h"
 
 enum { CONNECTS_AT_ONCE = 32, BURST = 64 };
-static const double GRACE_S = 1.0, START_S = 60.0;
+static const double GRACE_S = 2.0, START_S = 60.0;
 
 static struct session *sessions;
 static int session_count, timer;
@@ -128,6 +128,7 @@ static double run(double warmup_s, double seconds) {
   used = cpu_s() - used;
   say("end");
   if (now < end_s) end_s = now;  // the script or the sessions came to an end
+  while (open_loop && send_due(&tick, &place) == 0) turn(0);  // what was due just before the end, and is late
   while (tally.answered < tally.sent && tally.live && now_s() < now + GRACE_S) turn(now_s() + 0.05);
   return used;
 }
