@@ -1,38 +1,82 @@
-"""Recordings that repeat each other under two names: the same file twice, mirrored, cut elsewhere or another phase.
+"""Recordings that repeat each other under two names: copied, mirrored, cut, another phase, smoothed, with noise added.
 
-A data set that holds them leaks, however it is split by name. Two recordings count as one where most of the moving
-frames of the shorter one are found in the other, in order and at one constant lag, within a few degrees. Poses are
-compared by the rotations of the upper body, seven times a second; people never repeat a movement that closely.
+A data set that holds them leaks, however it is split by name. Compared are windows of `SPAN` of smoothed movement, less
+the window's mean pose, so that noise averages out. Two windows are the same movement where they differ by less than
+`RATIO` of how much they move, and their mean poses are near. Two recordings count as one where most of the moving
+windows of the shorter one are found in the other, in order and at one lag. People never repeat a movement that closely;
+only who walks on and on at one pace comes near.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
+from scipy.ndimage import uniform_filter1d
 
 from fervor.rotations import to_rotvec
 from fervor.skeletons.rig import UPPER_BODY, mirror_pose
 from fervor_export.clip import Clip
 
-Floats = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
 
-EVERY = 4
-"""Of the frames asked about, one in so many: about seven a second."""
+WIDTH = 3 * len(UPPER_BODY)
+"""Numbers of a pose: rotation vectors of the upper body."""
 
-TOLERANCE_RAD = 0.09
-"""Root of the summed squares over joints (5°): a 120 Hz phase moves a gesturing body by less."""
+SMOOTHED = 9
+"""Frames of the moving mean: 0.3 s."""
 
-MOVING_RAD = 0.10
-"""A frame that differs less from the one a second away stands still, and is no evidence."""
+STEP, STEPS = 8, 4
+"""A window is so many smoothed poses, so many frames apart."""
 
-SHARE, LEAST = 0.6, 4
-"""Of a recording's moving frames, and how many, must be found again."""
+SPAN = STEP * (STEPS - 1) + 1
+"""Frames that a window covers: 0.8 s."""
 
-LAG_SLACK = 1
-"""Frames by which a lag may waver: phases are rounded."""
+RATIO = 0.25
+"""Of how much a window moves, by which the same movement may differ. Unrelated movement differs by more than all of it;
+noise of 5° on every angle of a 120 Hz file by less, where people gesture."""
+
+NEAR_RAD = 0.45
+"""Root of the summed squares over joints by which mean poses may differ: 26°, for sensors mounted a little askew."""
+
+MOVING_RAD = 0.12
+"""Norm of a window below which it stands still, and is no evidence."""
+
+KEPT_EVERY, ASKED_EVERY = 2, 6
+"""Frames between windows that are looked through, and between those looked for."""
+
+SHARE, LEAST = 0.6, 2
+"""Of a recording's moving windows, and how many, must be found again."""
+
+LAG_SLACK = 4
+"""Frames by which a lag may waver: a clock may run 5 % fast."""
+
+DIMENSIONS = 40
+"""In which candidates are looked for; distances are never longer there, so nothing is missed."""
+
+ROUNDING = 1e-4
+"""Of float32 products."""
+
+TOGETHER = 512
+"""Windows looked for at once: bounds memory."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """Moving windows of clips."""
+
+    values: Floats  # [window, 4 · 27] rad, less the mean pose
+    mean: Floats  # [window, 27] rad
+    length: Floats  # [window] norms
+    clip: npt.NDArray[np.int64]  # [window]
+    frame: npt.NDArray[np.int64]  # [window] where it begins
+
+    @property
+    def directions(self) -> Floats:
+        """Of length one."""
+        return self.values / self.length[:, None]
 
 
 def groups(clips: Sequence[Clip]) -> dict[str, str]:
@@ -40,10 +84,8 @@ def groups(clips: Sequence[Clip]) -> dict[str, str]:
 
     Clips that share a name are one recording already.
     """
-    if not clips:
-        return {}
     leader = {clip.name: clip.name for clip in clips}
-    for a, b in _pairs(clips, [_poses(clip.rotations, clip.mask) for clip in clips]):
+    for a, b in _pairs(clips):
         first, second = sorted(_root(leader, clips[index].name) for index in (a, b))
         leader[second] = first
     roots = {name: _root(leader, name) for name in leader}
@@ -51,59 +93,104 @@ def groups(clips: Sequence[Clip]) -> dict[str, str]:
     return {name: root for name, root in roots.items() if sizes[root] > 1}
 
 
-def _pairs(clips: Sequence[Clip], poses: Sequence[Floats]) -> set[tuple[int, int]]:
-    """Pairs of clips of which one repeats the other."""
-    owner = np.concatenate([np.full(len(pose), index) for index, pose in enumerate(poses)])
-    frame = np.concatenate([np.arange(len(pose)) for pose in poses])
-    tree = KDTree(np.concatenate(poses))
+def _pairs(clips: Sequence[Clip]) -> list[tuple[int, int]]:
+    """Pairs of clips of which one repeats the other, in order."""
+    plain = [_smoothed(clip) for clip in clips]
+    kept = _windows(plain, KEPT_EVERY)
     found = set()
-    for index, clip in enumerate(clips):
-        for seen in (poses[index], _poses(*mirror_pose(clip.rotations, clip.mask))):
-            asked = _moving(seen)
-            if len(asked) < LEAST:
-                continue
-            hits: Any = tree.query_ball_point(seen[asked], TOLERANCE_RAD)
-            for other in _repeats(hits, asked, index, owner, frame):
-                found.add((min(index, other), max(index, other)))
-    return found
-
-
-def _repeats(
-    hits: Sequence[Sequence[int]],
-    asked: npt.NDArray[np.intp],
-    index: int,
-    owner: npt.NDArray[np.intp],
-    frame: npt.NDArray[np.intp],
-) -> list[int]:
-    """Clips in which enough of the frames `asked` are found at one lag."""
-    votes: Counter[tuple[int, int]] = Counter()
-    for at, hit in zip(asked, hits, strict=True):
-        lags = {
-            (int(owner[place]), int(frame[place] - at) + slack)
-            for place in hit
-            if owner[place] != index
-            for slack in range(-LAG_SLACK, LAG_SLACK + 1)
+    for poses in (plain, [_smoothed(clip, mirror=True) for clip in clips]):
+        asked = _windows(poses, ASKED_EVERY)
+        votes: Counter[tuple[int, int, int]] = Counter()
+        for here, there in _alike(asked, kept):
+            votes.update(_votes(asked, kept, here, there))
+        counts = np.bincount(asked.clip, minlength=len(clips))
+        found |= {
+            (min(mine, other), max(mine, other))
+            for (mine, other, _), count in votes.items()
+            if count >= max(LEAST, SHARE * counts[mine])
         }
-        votes.update(lags)
-    needed = max(LEAST, SHARE * len(asked))
-    return sorted({other for (other, _), count in votes.items() if count >= needed})
+    return sorted(found)
 
 
-def _poses(rotations: npt.NDArray[np.float32], mask: npt.NDArray[np.bool_]) -> Floats:
-    """Upper bodies [frame, 27] as rotation vectors; what was not observed is zero."""
-    upper = list(UPPER_BODY)
-    turns = to_rotvec(rotations[:, upper].astype(np.float64)) * mask[:, upper, None]
-    return turns.reshape(len(turns), -1)
+def _votes(asked: _Windows, kept: _Windows, here: Any, there: Any) -> set[tuple[int, int, int]]:
+    """Who is asked about, in whom it was found, and lags that this speaks for; `here` is one window's place."""
+    mine, others = int(asked.clip[here]), kept.clip[there]
+    lags = kept.frame[there] - asked.frame[here]
+    return {
+        (mine, other, lag + slack)
+        for other, lag in zip(others.tolist(), lags.tolist(), strict=True)
+        if other != mine
+        for slack in range(-LAG_SLACK, LAG_SLACK + 1)
+    }
 
 
-def _moving(poses: Floats) -> npt.NDArray[np.intp]:
-    """Every so many frames, those where the body moves."""
-    away = np.minimum(np.arange(len(poses)) + 30, len(poses) - 1)
-    back = np.maximum(np.arange(len(poses)) - 30, 0)
-    moved = np.maximum(*(np.linalg.norm(poses - poses[other], axis=1) for other in (away, back)))
-    asked = np.arange(0, len(poses), EVERY)
-    moving: npt.NDArray[np.intp] = asked[moved[asked] > MOVING_RAD]
-    return moving
+def _alike(asked: _Windows, kept: _Windows) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
+    """For each window asked about the places of those that hold the same movement, where there are any.
+
+    |a - b|² ≤ RATIO² |a| |b| implies |a/|a| - b/|b|| ≤ RATIO, and no projection makes that longer.
+    """
+    if not len(kept.values) or not len(asked.values):
+        return
+    axes = _main_axes(kept.directions)
+    look, near = asked.directions @ axes, kept.directions @ axes
+    ones = [np.ones((len(points), 1), np.float32) for points in (look, near)]
+    half = [-0.5 * (points**2).sum(1, keepdims=True) for points in (look, near)]
+    look, near = np.hstack([look, half[0], ones[0]]), np.hstack([near, ones[1], half[1]])  # product: -distance² / 2
+    for start in range(0, len(look), TOGETHER):
+        close = look[start : start + TOGETHER] @ near.T >= -0.5 * RATIO**2 - ROUNDING
+        rows, columns = np.divmod(np.flatnonzero(close), len(near))  # many times faster than nonzero of two axes
+        rows += start
+        off = ((asked.values[rows] - kept.values[columns]) ** 2).sum(1)
+        same = off <= RATIO**2 * asked.length[rows] * kept.length[columns]
+        same &= ((asked.mean[rows] - kept.mean[columns]) ** 2).sum(1) <= NEAR_RAD**2
+        places, first = np.unique(rows[same], return_index=True)
+        parts = np.split(columns[same], first[1:])
+        yield from zip(places.tolist(), parts, strict=False)  # of no places there is one part, an empty one
+
+
+def _main_axes(directions: Floats) -> Floats:
+    """The directions [4 · 27, axis] along which windows differ most."""
+    _, axes = np.linalg.eigh(directions.T @ directions)
+    main: Floats = axes[:, -DIMENSIONS:]
+    return main
+
+
+def _windows(poses: Sequence[Floats], every: int) -> _Windows:
+    """Moving windows of clips' smoothed poses, one each so many frames."""
+    values, means, owners, frames = (
+        [np.empty((0, STEPS * WIDTH), np.float32)],
+        [np.empty((0, WIDTH), np.float32)],
+        [],
+        [],
+    )
+    for index, series in enumerate(poses):
+        begins = np.arange(0, max(len(series) - SPAN + 1, 0), every)
+        whole = np.stack([series[begins + STEP * step] for step in range(STEPS)], axis=1)  # [window, 4, 27]
+        mean = whole.mean(1)
+        window = (whole - mean[:, None]).reshape(len(begins), STEPS * WIDTH)
+        moving = np.linalg.norm(window, axis=1) > MOVING_RAD
+        values.append(window[moving])
+        means.append(mean[moving])
+        owners += [index] * int(moving.sum())
+        frames += begins[moving].tolist()
+    stacked = np.concatenate(values)
+    length = np.linalg.norm(stacked, axis=1)
+    return _Windows(stacked, np.concatenate(means), length, np.array(owners, np.int64), np.array(frames, np.int64))
+
+
+def _smoothed(clip: Clip, *, mirror: bool = False) -> Floats:
+    """Upper bodies [frame, 27] as rotation vectors, smoothed over time and over the recording's phases."""
+    phases = [(clip.rotations, clip.mask), *clip.phases]
+    frames = min(len(rotations) for rotations, _ in phases)
+    upper, total = list(UPPER_BODY), np.zeros((frames, WIDTH))
+    for rotations, mask in phases:
+        turned, seen = rotations[:frames], mask[:frames]
+        if mirror:
+            turned, seen = mirror_pose(turned, seen)
+        turns = to_rotvec(turned[:, upper].astype(np.float64)) * seen[:, upper, None]
+        total += turns.reshape(frames, -1)
+    smooth = uniform_filter1d(total / len(phases), SMOOTHED, axis=0, mode="nearest")
+    return smooth.astype(np.float32)
 
 
 def _root(leader: dict[str, str], name: str) -> str:
