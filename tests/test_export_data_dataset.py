@@ -105,6 +105,15 @@ def test_everything_wrong_with_a_manifest_is_told_at_once(tmp_path: Path) -> Non
     assert len(data.clips) == 2
 
 
+def test_findings_are_in_the_order_of_the_lines(tmp_path: Path) -> None:
+    manifest = manifest_of_all_kinds(tmp_path)
+    (tmp_path / "ann" / "1.bvh").write_text("HIERARCHY\nbroken")
+    manifest.write_text(manifest.read_text().replace("1/5", "9/5").replace("anger", "envy"))
+    found = [str(finding) for finding in check_dataset(manifest).unusable]
+    assert [one.partition(" (")[0] for one in found] == ["line 2", "line 3", "line 4"]
+    assert found[0].startswith("line 2 (ann/1.bvh): 1.bvh, line 2: ")
+
+
 def test_every_planted_fault_of_the_first_layout_is_told_and_the_rest_is_used(tmp_path: Path) -> None:
     made = takes(8)
     rows = write_ebmdb(tmp_path, made)

@@ -102,6 +102,13 @@ def test_semicolons_and_a_byte_order_mark(tmp_path: Path) -> None:
     assert (entry.actor, entry.emotion) == ("Jörg", "joy")
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_tables_as_windows_writes_them(tmp_path: Path, encoding: str) -> None:
+    (tmp_path / "m.csv").write_bytes("file;emotion;votes;actor\r\na.bvh;joy;7/11;Jörg\r\n".encode(encoding))
+    (entry,) = list_manifest(tmp_path / "m.csv").entries
+    assert entry.actor == "Jörg"
+
+
 def test_clips_of_one_file_are_one_recording(tmp_path: Path) -> None:
     listing = listed(tmp_path, row(start=0, end=2), row(start=2, end=4, emotion="anger"))
     assert [entry.name for entry in listing.entries] == ["a", "a"]
@@ -123,6 +130,43 @@ def test_one_file_is_of_one_actor_and_in_one_split(tmp_path: Path, second: dict[
     )
     assert len(listing.entries) == 1
     assert what in problems(listing)[0]
+
+
+@pytest.mark.parametrize("again", ["link.bvh", "copy.bvh"])
+def test_a_link_or_a_copy_is_the_same_file(tmp_path: Path, again: str) -> None:
+    (tmp_path / "a.bvh").write_text("some motion")
+    (tmp_path / "link.bvh").symlink_to(tmp_path / "a.bvh")
+    (tmp_path / "copy.bvh").write_text("some motion")
+    first = row(split="train", start=0, end=2)
+    listing = listed(tmp_path, first, row(file=again, split="test", start=2, end=4))
+    assert "the split is test, but train in line 2" in problems(listing)[0]
+    listing = listed(tmp_path, first, row(file=again, split="train", start=2, end=4))
+    assert [entry.name for entry in listing.entries] == ["a", "a"]
+
+
+def test_files_of_one_size_are_not_one_file(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text("some motion")
+    (tmp_path / "sub" / "a.bvh").write_text("more motion")
+    listing = listed(tmp_path, row(split="train"), row(file="sub/a.bvh", actor="Ben", split="test"))
+    assert [entry.name for entry in listing.entries] == ["a", "sub/a"]
+    assert not listing.findings
+
+
+def test_one_person_spelt_in_two_ways_is_one_person(tmp_path: Path) -> None:
+    names = ("Zoë M", "zoë  m", "Zoe\u0308 M", "Zoe M")
+    files = ("a.bvh", "b.csv", "c.mvnx", "sub/a.bvh")
+    listing = listed(tmp_path, *(row(file=file, actor=actor) for file, actor in zip(files, names, strict=True)))
+    assert [entry.actor for entry in listing.entries] == ["Zoë M", "Zoë M", "Zoë M", "Zoe M"]
+    doubts = problems(listing, "doubt")
+    assert len(doubts) == 2
+    assert doubts[0] == "line 3 (b.csv): actor 'zoë  m' is taken for 'Zoë M'"
+
+
+@pytest.mark.parametrize("name", ["x" * 5000 + ".bvh", "a\nb.bvh", "sub"])
+def test_a_name_that_is_no_file_is_one_line_of_the_report(tmp_path: Path, name: str) -> None:
+    (problem,) = problems(listed(tmp_path, row(file=name)))
+    assert "\n" not in problem
+    assert len(problem) < 600
 
 
 def test_splits_that_share_a_person_are_told(tmp_path: Path) -> None:

@@ -102,3 +102,10 @@ def test_fingerprints_are_those_of_a_pose_and_of_its_mirror_image() -> None:
     reflected = fingerprints(*mirror_pose(local, observed))
     assert not np.isin(reflected, prints).any()
     np.testing.assert_array_equal(fingerprints(*mirror_pose(*mirror_pose(local, observed))), prints)
+
+
+def test_a_frame_time_in_milliseconds_is_refused(tmp_path: Path) -> None:
+    file = datasets.write_bvh(tmp_path / "a.bvh", datasets.motion(seconds=1.0))
+    file.write_text(file.read_text().replace("Frame Time: 0.008333", "Frame Time: 8.333"))
+    with pytest.raises(DataError, match=r"it has 0\.12 frames a second; expected 5 or more"):
+        read_motion(file)

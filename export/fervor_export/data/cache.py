@@ -23,7 +23,7 @@ from fervor.skeletons.rig import JOINTS
 from fervor_export.clip import Phase
 from fervor_export.data.motion import Motion
 
-LOADER_VERSION = 1
+LOADER_VERSION = 2
 """Of how files become motion; part of every key."""
 
 

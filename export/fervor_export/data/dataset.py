@@ -153,7 +153,7 @@ def check_dataset(
         description=f"{listing.description}: {len(clips)} clips of {actors} actor{'s' if actors != 1 else ''}",
         clips=clips,
         takes=tuple(takes),
-        findings=tuple(listing.findings),
+        findings=tuple(sorted(listing.findings, key=lambda finding: finding.place)),
         splits=_splits(takes),
     )
 

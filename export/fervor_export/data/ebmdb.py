@@ -114,12 +114,16 @@ def _list_row(listing: Listing, row: Row, where: str, path: Path, codes: Mapping
         listing.unusable(where, "neither the file name nor a column actor says who moved")
         return False
     if told.actor and codes.get(column, told.actor) != told.actor:
-        listing.unusable(where, f"actor is {column!r}, elsewhere {codes[column]}; the file name says {told.actor}")
+        listing.unusable(where, f"the column actor says {_said(column, codes)}, the file name says {told.actor}")
         return False
     if told.emotion and told.emotion != label.emotion:
         listing.doubt(where, f"intended_emotion is {label.emotion}; the file name says {told.emotion}")
     listing.entries.append(_entry(where, path, actor, label, told.seconds))
     return True
+
+
+def _said(column: str, codes: Mapping[str, str]) -> str:
+    return column if codes[column] == column else f"{column}, elsewhere {codes[column]}"
 
 
 def _entry(where: str, path: Path, actor: str, label: Label, seconds: float | None) -> Entry:

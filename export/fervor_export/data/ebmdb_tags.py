@@ -20,7 +20,7 @@ from fervor.errors import DataError
 from fervor_export.data.ebmdb import DESCRIPTION, find_files, share_of
 from fervor_export.data.label import Label, known_emotion, label_from_responses
 from fervor_export.data.listing import Entry, Finding, Listing
-from fervor_export.data.table import Row, read_table
+from fervor_export.data.table import Row, read_table, read_text
 
 NAMES = Path("tags") / "tag_names.txt"
 TABLE = "responses.csv"
@@ -156,8 +156,4 @@ def _number(text: str) -> str:
 
 def _lines(path: Path) -> list[str]:
     """Lines of a text file, stripped; empty ones at the end are dropped."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig", errors="replace")
-    except OSError as error:
-        raise DataError(f"{path}: can't be read: {error.strerror or error}") from error
-    return [line.strip() for line in text.rstrip().splitlines()]
+    return [line.strip() for line in read_text(path).rstrip().splitlines()]

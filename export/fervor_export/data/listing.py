@@ -3,6 +3,8 @@
 Findings are collected, never raised one by one: whoever mends a data set wants all of them at once.
 """
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +29,12 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.where}: {self.what}"
+
+    @property
+    def place(self) -> float:
+        """Where to list it: what concerns a column first, then by line, then files."""
+        line = re.match(r"line (\d+)", self.where)
+        return float(line[1]) if line else 0.0 if self.where.startswith("column") else math.inf
 
 
 @dataclass(frozen=True, slots=True)

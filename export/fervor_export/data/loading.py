@@ -92,7 +92,7 @@ def _answer(ask: Ask, cache: Path | None) -> Answer:
         if cache is not None:
             save(cache, ask.key(), motion)
     except InputError as error:
-        return error.message.removeprefix(f"{ask.file}: ")
+        return error.message.removeprefix(f"{ask.file}: ").removeprefix(f"{ask.file.parent}{os.sep}")
     except OSError as error:
         return f"can't be read: {error.strerror or error}"
     return motion

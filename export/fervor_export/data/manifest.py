@@ -6,12 +6,16 @@
 
 Rules. `file`, `emotion`, `actor`, and `votes` (k/n) or `intensity` (0 to 1) are needed; `observers` is n beside an
 intensity. Paths are relative to the manifest. All that is wrong is told at once, by line. Clips cut from one file are
-one recording: they may not be of two actors, nor in two splits.
+one recording: they may not be of two actors, nor in two splits. So are clips of a file and of its copy or a link to it.
+Names of actors that differ in case or blanks alone are one person's.
 """
 
 import math
+import unicodedata
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from hashlib import file_digest
 from pathlib import Path
 from typing import TypeVar
 
@@ -28,6 +32,9 @@ SPLITS = ("train", "validation", "test")
 
 NAME = "manifest.csv"
 """What a manifest is called in a folder that is given instead of it."""
+
+LONGEST_SHOWN = 160
+"""Letters of a name in messages."""
 
 T = TypeVar("T")
 
@@ -52,6 +59,7 @@ def list_manifest(path: Path) -> Listing:
             listing.doubt("line 1", f"the column {column!r} has no meaning here and is not used")
     for row in table.rows:
         _list_row(listing, row, table, path.parent)
+    _name_actors_alike(listing)
     _check_files(listing)
     _check_actors(listing)
     if not table.rows:
@@ -61,7 +69,7 @@ def list_manifest(path: Path) -> Listing:
 
 def _list_row(listing: Listing, row: Row, table: Table, folder: Path) -> None:
     """The entry of one row, or all that is wrong with it."""
-    where = f"line {row.line} ({row['file'] or 'no file'})"
+    where = f"line {row.line} ({_shown(row['file']) or 'no file'})"
     problems: list[str] = []
 
     def tried(read: Callable[[Row], T]) -> T | None:
@@ -94,8 +102,12 @@ def _file(row: Row, folder: Path) -> Path:
     if not row["file"]:
         raise DataError("file is empty; expected a path relative to the manifest")
     path = folder / row["file"]
-    if not path.is_file():
-        raise DataError(f"there is no file {path}")
+    try:
+        found = path.is_file()
+    except OSError as error:  # a name that is too long, a folder that is closed to us
+        raise DataError(f"{_shown(str(path))}: can't be read: {error.strerror or error}") from error
+    if not found:
+        raise DataError(f"there is no file {_shown(str(path))}" + (", it is a folder" if path.is_dir() else ""))
     return path
 
 
@@ -168,15 +180,63 @@ def _number(text: str, column: str) -> float:
     return value
 
 
+def _shown(name: str) -> str:
+    """A name for messages: on one line, and not without end."""
+    printable = "".join(letter if letter.isprintable() else " " for letter in name)
+    return printable if len(printable) <= LONGEST_SHOWN else f"{printable[:LONGEST_SHOWN]}…"
+
+
 # --- rows together ----------------------------------------------------------------------------------------------------
+
+
+def _name_actors_alike(listing: Listing) -> None:
+    """One spelling for names that differ in case, blanks or Unicode form only: the first."""
+    first: dict[str, str] = {}
+    told = set()
+    for place, entry in enumerate(listing.entries):
+        name = first.setdefault("".join(unicodedata.normalize("NFKC", entry.actor).casefold().split()), entry.actor)
+        if name != entry.actor:
+            if entry.actor not in told:
+                listing.doubt(entry.where, f"actor {entry.actor!r} is taken for {name!r}")
+            told.add(entry.actor)
+            listing.entries[place] = replace(entry, actor=name)
 
 
 def _check_files(listing: Listing) -> None:
     """One file, one actor and one split; the same stretch only once. What breaks this is left out."""
-    by_file: defaultdict[Path, list[Entry]] = defaultdict(list)
+    paths = {entry.file: entry.file.resolve() for entry in listing.entries}
+    whole = _originals(paths.values())
+    by_content: defaultdict[Path, list[Entry]] = defaultdict(list)
     for entry in listing.entries:
-        by_file[entry.file.resolve()].append(entry)
-    listing.entries = [entry for entry in listing.entries if _fits(listing, entry, by_file[entry.file.resolve()])]
+        by_content[whole[paths[entry.file]]].append(entry)
+    kept = []
+    for entry in listing.entries:
+        same = by_content[whole[paths[entry.file]]]
+        if _fits(listing, entry, same):
+            kept.append(replace(entry, name=same[0].name))
+    listing.entries = kept
+
+
+def _originals(paths: Iterable[Path]) -> dict[Path, Path]:
+    """Each file's first one with the same bytes; only files of one size are read. Empty files are all their own."""
+    by_size: defaultdict[int, list[Path]] = defaultdict(list)
+    for path in dict.fromkeys(paths):
+        by_size[path.stat().st_size].append(path)
+    first: dict[Path, Path] = {}
+    for size, same in by_size.items():
+        known: dict[bytes, Path] = {}
+        for path in same:
+            alone = len(same) == 1 or not size
+            first[path] = path if alone else known.setdefault(_sha256(path), path)
+    return first
+
+
+def _sha256(path: Path) -> bytes:
+    try:
+        with path.open("rb") as stream:
+            return file_digest(stream, "sha256").digest()
+    except OSError:
+        return str(path).encode()  # told when it is to be read
 
 
 def _fits(listing: Listing, entry: Entry, same_file: Sequence[Entry]) -> bool:
@@ -191,7 +251,10 @@ def _fits(listing: Listing, entry: Entry, same_file: Sequence[Entry]) -> bool:
             splits = f"{entry.split or 'none'}, but {other.split or 'none'}"
             listing.unusable(entry.where, f"the split is {splits} in {other.where}; one file can't be in two")
             return False
-        if (other.start_s, other.end_s) == (entry.start_s, entry.end_s):
+        again = (other.file.resolve(), other.start_s, other.end_s) == (
+            entry.file.resolve(), entry.start_s, entry.end_s,
+        )  # fmt: skip
+        if again:
             listing.unusable(entry.where, f"the same stretch of the same file as in {other.where}")
             return False
     return True

@@ -26,6 +26,9 @@ MOST_PHASES = 4
 LEAST_S = 0.5
 """Recordings shorter than this are no motion that anybody could judge."""
 
+LEAST_HZ = 5.0
+"""With fewer frames a second there would be gaps alone; files have been seen with a frame time in milliseconds."""
+
 T_POSE_ARM_DEG, T_POSE_REST_DEG = 12.0, 25.0
 """How far arms, and trunk and head, may be from a T-pose: files have been seen with a bent neck in it."""
 
@@ -155,6 +158,8 @@ def _rate(times: Floats) -> float:
 
 def _check(times: Floats, observed: Mask) -> None:
     seconds = float(times[-1] - times[0]) if len(times) else 0.0
+    if 0.0 < _rate(times) < LEAST_HZ:
+        raise DataError(f"it has {_rate(times):.2g} frames a second; expected {LEAST_HZ:g} or more, times in seconds")
     if seconds < LEAST_S:
         raise DataError(f"{seconds:.2f} s of motion are too short; expected {LEAST_S:g} s or more")
     if not observed[:, UPPER_BODY].any():

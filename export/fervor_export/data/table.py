@@ -1,5 +1,6 @@
-"""CSV tables as data sets bring them: commas, semicolons or tabs, with or without a byte order mark."""
+"""CSV tables as data sets bring them: commas, semicolons or tabs; UTF-8, UTF-16 or what Windows writes."""
 
+import codecs
 import csv
 import io
 from collections.abc import Mapping
@@ -42,10 +43,7 @@ def read_table(path: Path) -> Table:
     Raises:
         DataError: the file can't be read as one.
     """
-    try:
-        text = path.read_bytes().decode("utf-8-sig", errors="replace")
-    except OSError as error:
-        raise DataError(f"{path}: can't be read: {error.strerror or error}") from error
+    text = read_text(path)
     first = text.partition("\n")[0]
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=max(",;\t", key=first.count))
     try:
@@ -58,3 +56,21 @@ def read_table(path: Path) -> Table:
     except csv.Error as error:
         raise DataError(f"{path}, line {reader.line_num}: not a table ({error})") from None
     return Table(columns, tuple(rows))
+
+
+def read_text(path: Path) -> str:
+    """A text file whose encoding nobody says: by its byte order mark, else UTF-8, else Windows-1252.
+
+    Raises:
+        DataError: the file can't be read.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path}: can't be read: {error.strerror or error}") from error
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", errors="replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", errors="replace")
