@@ -148,6 +148,10 @@ def test_the_same_motion_twice_is_one_recording_or_left_out(tmp_path: Path) -> N
     write_table(tmp_path / EBMDB_TABLE, [*ebmdb_rows(made), *extra])
     data = load_dataset(tmp_path)
     assert len(said(data)) == 1
+    assert data.notes == (
+        "Rows and files left out, as they can't be used: 1; `fervor data check` lists them.",
+        "Recordings left out, as they repeat one of another actor or split: 1.",
+    )
     assert "actor DiMi" in said(data)[0]
     assert "a leak" in said(data)[0]
     assert [clip.name for clip in data.clips[6:]] == [made[0].name, made[2].name]

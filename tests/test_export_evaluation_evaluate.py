@@ -18,7 +18,7 @@ from fervor_export.evaluation import duplicates
 from fervor_export.evaluation.estimator import NetworkEstimator, Reading
 from fervor_export.evaluation.evaluate import Evaluated, Material, Options, Watch, evaluate, evaluate_model
 from fervor_export.evaluation.held_out import write_learned_from
-from fervor_export.evaluation.protocols import PREDICTORS
+from fervor_export.evaluation.protocols import PREDICTORS, Learned, Learner
 from fervor_export.evaluation.report import html, predictions_csv, write
 from fervor_export.recipe import DEFAULT, PAPER
 from fervor_export.synthetic import synthesise_dataset
@@ -165,6 +165,70 @@ def test_the_split_of_the_data_comes_first():
     assert [protocol.name for protocol in done.result.protocols] == ["given", "recordings", "actors"]
     assert len(done.runs["given"].clips) == 14
     assert any("time ended 1 of 1 trainings early" in warning for warning in done.result.warnings)
+
+
+def test_what_repeats_a_judged_recording_is_not_learned_from_in_the_split_of_the_data():
+    made = clips(44, actors=4)
+    random = np.random.default_rng(0)
+    noise = (made[32].rotations + random.normal(0, 0.005, made[32].rotations.shape)).astype(np.float32)
+    leaked = replace(made[32], rotations=noise, name="a noisy copy", actor="somebody new")
+    splits = {"train": [*made[:30], leaked], "test": made[30:]}
+    learned = []
+
+    def note(learner, train, test, unit, minutes):
+        learned.append({clip.name for clip in train})
+        return Learned(NetworkEstimator(network()))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Learner, "learn", note)
+        done = evaluate(Material([*made, leaked], "x", procedural=False, splits=splits), DEFAULT, options=QUICK)
+    assert learned[0] == {clip.name for clip in made[:30]}
+    said = " ".join(done.result.warnings)
+    assert "The data's own split: 1 clips repeat judged recordings and were not learned from." in said
+    assert "The data's own split has actors on both sides: actor 0, actor 1, actor 2, actor 3." in said
+
+
+def test_a_network_that_knows_people_is_told_of_and_gets_its_low_number():
+    made = clips(120, actors=6)
+    habit = {f"actor {number}": (number + 0.5) / 6 for number in range(6)}
+    made = [
+        replace(clip, intensity=0.9 * habit[clip.actor] + 0.1 * clip.intensity, observers=None, emotion="joy")
+        for clip in made
+    ]
+
+    actor_of = {clip.rotations.tobytes(): clip.actor for clip in made}
+
+    class Memory:
+        """Knows by heart whom it has met, and what they are like; nothing of anybody else."""
+
+        def __init__(self, met):
+            self.met = set(met)
+
+        def estimate(self, motions):
+            actors = [actor_of.get(motion.rotations.tobytes()) for motion in motions]
+            return [
+                np.full((len(motion), 12), habit[actor] if actor in self.met else 0.5 + 1e-4 * len(motion), np.float32)
+                for motion, actor in zip(motions, actors, strict=True)
+            ]
+
+    def remember(learner, train, test, unit, minutes):
+        return Learned(Memory(clip.actor for clip in train))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Learner, "learn", remember)
+        done = evaluate(Material(made, "x", procedural=False), DEFAULT, options=QUICK)
+    by_recording, by_actor = (protocol.predictor("network").scores.r_within.value for protocol in done.result.protocols)
+    assert by_recording > 0.9
+    assert abs(by_actor) < 0.4
+    assert any("agrees better with actors that it has learned from" in warning for warning in done.result.warnings)
+
+
+def test_a_model_is_judged_by_one_new_actor_too():
+    material = Material(clips(22, actors=1), "x", procedural=False, notes=["Left out: 3."])
+    done = evaluate_model(NetworkEstimator(network()), material, Reading(last=False), model="m", options=QUICK)
+    (protocol,) = done.result.protocols
+    assert (protocol.name, protocol.unit, protocol.folds) == ("held_out", "recording", 2)
+    assert "Left out: 3." in done.result.warnings
 
 
 def test_few_actors_skip_what_they_do_not_allow():

@@ -115,6 +115,13 @@ def test_what_can_not_be_split():
         as_given(clips, clips[:6], clips[5:])
 
 
+def test_a_given_split_does_not_learn_from_what_repeats_a_judged_recording():
+    clips = waving_clips(10)
+    same = {"clip1": "clip1", "clip7": "clip1"}
+    (fold,) = as_given(clips, clips[:5], clips[5:], same=same)
+    assert (fold.train, fold.test) == ((0, 2, 3, 4), (5, 6, 7, 8, 9))
+
+
 def test_the_split_that_the_data_bring():
     clips = waving_clips(10)
     (fold,) = as_given(clips, clips[:3], clips[5:])

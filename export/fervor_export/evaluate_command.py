@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from fervor_export.evaluation.estimator import Estimator, Reading
     from fervor_export.evaluation.evaluate import Evaluated, Material, Options, Watch
     from fervor_export.evaluation.held_out import LearnedFrom
-    from fervor_export.evaluation.metrics import Figure
     from fervor_export.evaluation.protocols import Augment
     from fervor_export.recipe import Recipe
     from fervor_export.training import Epoch
@@ -52,7 +51,7 @@ def evaluate(  # noqa: PLR0917  # typer calls it by name
     what = recipe if checkpoint is None else Path(checkpoint).stem
     directory = out or Path("evaluations") / f"{Path(data).stem}-{what}-{seed}"
     write(evaluated, directory)
-    _show(evaluated)
+    show(evaluated)
     typer.echo(f"{directory / 'evaluation.html'}")
 
 
@@ -94,7 +93,7 @@ def _load(data: str, clips: int, seed: int, progress: "Progress") -> "Material":
         votes=True,
     )
     progress.remove_task(task)
-    return Material(loaded.clips, loaded.description, loaded.kind == SYNTHETIC, loaded.splits)
+    return Material.of(loaded)
 
 
 def _copies_of(recipe: "Recipe") -> "Augment":
@@ -162,44 +161,10 @@ def _model(which: str) -> "tuple[Estimator, Reading, str, bool, LearnedFrom | No
     return NetworkEstimator(trained.network), reading, str(path), trained.purpose == "demo", learned
 
 
-def _show(evaluated: "Evaluated") -> None:
-    """The paper's table on the terminal, warnings first."""
-    from rich.box import SIMPLE
+def show(evaluated: "Evaluated") -> None:
+    """The numbers on the terminal, warnings first."""
     from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
 
-    from fervor_export.evaluation.protocols import PREDICTORS
+    from fervor_export.evaluation.terminal import print_evaluation
 
-    result, console = evaluated.result, Console()
-    for index, warning in enumerate(result.warnings):
-        style = "bold red" if result.data.procedural and not index else "yellow"
-        console.print(escape(warning), style=style)
-    for name, why in result.skipped.items():
-        console.print(escape(f"not done: {name}: {why}"), style="yellow")
-    table = Table(title="Pearson r [95 % interval, actors resampled]", box=SIMPLE, padding=(0, 1, 0, 0))
-    table.add_column("", no_wrap=True)
-    for protocol in result.protocols:
-        table.add_column(f"{protocol.title}: r", justify="right")
-        table.add_column("within emotion", justify="right")
-    for name, title in PREDICTORS.items():
-        found = [
-            predictor for protocol in result.protocols for predictor in protocol.predictors if predictor.name == name
-        ]
-        if found:
-            figures = [figure for one in found for figure in (one.scores.r_all, one.scores.r_within)]
-            table.add_row(title, *map(_said, figures))
-    ceilings = [
-        value for protocol in result.protocols for value in (protocol.ceilings.r_all, protocol.ceilings.r_within)
-    ]
-    table.add_row("noise ceiling", *("-" if value is None else f"{value:.2f}" for value in ceilings))
-    console.print(table)
-
-
-def _said(figure: "Figure") -> str:
-    if figure.value is None:
-        return "-"
-    if figure.low is None or figure.high is None:
-        return f"{figure.value:.2f}"
-    low, high = (f"{end:.2f}".replace("0.", ".") for end in (figure.low, figure.high))  # eighty columns are not many
-    return rf"{figure.value:.2f}" + "\n" + rf"\[{low}, {high}]"
+    print_evaluation(Console(), evaluated.result)

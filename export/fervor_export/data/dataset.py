@@ -32,6 +32,9 @@ SYNTHETIC = "synthetic"
 CAST_CLIPS = 1000
 """Synthetic clips of one cast of actors; more clips have more casts, and another seed has others."""
 
+LEAK = "a leak between folds"
+"""How the finding of a recording that is another actor's or split's too ends."""
+
 LENGTHS_APART_S = 0.25
 """How far a recording's length may be from what its name says."""
 
@@ -86,6 +89,17 @@ class Dataset:
     def unusable(self) -> list[Finding]:
         """What had to be left out, though it should not be."""
         return [finding for finding in self.findings if finding.severity == "unusable"]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What whoever reads figures of these clips must know: sentences."""
+        bad = self.unusable
+        leaks = sum(finding.what.endswith(LEAK) for finding in bad)
+        said = (
+            (bad, f"Rows and files left out, as they can't be used: {len(bad)}; `fervor data check` lists them."),
+            (leaks, f"Recordings left out, as they repeat one of another actor or split: {leaks}."),
+        )
+        return tuple(sentence for applies, sentence in said if applies)
 
 
 def load_dataset(
@@ -216,7 +230,7 @@ def _takes(listing: Listing, pairs: Sequence[tuple[Entry, Motion]]) -> list[Take
             recordings = [recordings[twins.first] if name == recordings[twins.second] else name for name in recordings]
         else:
             what = f"actor {first.actor}" if first.actor != second.actor else f"in the split {first.split or 'none'}"
-            listing.unusable(second.where, f"it is {same}, {what}: a leak between folds")
+            listing.unusable(second.where, f"it is {same}, {what}: {LEAK}")
             left_out.add(twins.second)
     return [
         Take(entry, motion, recording, None if index in left_out else _clip(entry, motion, recording))

@@ -201,7 +201,7 @@ def _summary(memory: Memory, parts: Sequence[tuple[Floats, Floats, LongStream]],
     return Drift(
         memory=memory,
         streams=len(parts),
-        slope=round(slope, 5),
+        slope=round(slope, 5) + 0.0,  # never -0
         slope_low=None if half is None else round(slope - half, 5),
         slope_high=None if half is None else round(slope + half, 5),
         apart=round(float(np.mean(apart)), 4),

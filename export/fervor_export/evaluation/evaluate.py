@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from fervor.errors import DataError
 from fervor_export.clip import Clip
+from fervor_export.data.dataset import Dataset
 from fervor_export.evaluation import baseline, duplicates, handcrafted
 from fervor_export.evaluation.drift import MINUTES, STREAMS, drift
 from fervor_export.evaluation.estimator import Estimator, Reading
@@ -18,7 +19,7 @@ from fervor_export.evaluation.invariance import MOST_CLIPS, invariance
 from fervor_export.evaluation.protocols import Augment, Budget, Learn, Learned, Learner, Run, run
 from fervor_export.evaluation.result import Evaluation
 from fervor_export.evaluation.splits import Split, Unit, as_given, by_actor, by_recording
-from fervor_export.evaluation.summary import describe, summarise, thresholds_of, warnings_of
+from fervor_export.evaluation.summary import describe, summarise, thresholds_of, warnings_of, warnings_of_split
 from fervor_export.export import library_versions
 from fervor_export.recipe import Recipe
 from fervor_export.training import Epoch
@@ -57,6 +58,13 @@ class Material:
     """Whether a program made it."""
     splits: Mapping[str, Sequence[Clip]] = field(default_factory=dict)
     """Clips by the split that the data set brings along: train, validation, test."""
+    notes: Sequence[str] = ()
+    """What a reader must know of how the clips were come by: sentences, told among the warnings."""
+
+    @classmethod
+    def of(cls, data: Dataset) -> "Material":
+        """A data set, with what was wrong with it."""
+        return cls(data.clips, data.description, data.purpose == "demo", data.splits, data.notes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +133,7 @@ def evaluate_model(
         watch: whom to tell.
 
     Raises:
-        DataError: fewer than two actors.
+        DataError: a single recording.
     """
 
     def known(_train: Sequence[Clip], _test: Sequence[Clip], _unit: Unit, _minutes: float | None) -> Learned:
@@ -133,7 +141,7 @@ def evaluate_model(
 
     work = _Work(material, options or Options(), watch or Watch(), reading, model)
     work.find_repeats()
-    work.splits[HELD_OUT] = by_actor(material.clips, seed=work.options.seed, same=work.repeats)
+    work.splits[HELD_OUT] = work.held_out()
     work.run_all(known)
     return work.conclude()
 
@@ -181,12 +189,20 @@ class _Work:
             ACTORS: lambda: by_actor(clips, seed=options.seed, same=self.repeats),
         }
         if learned and given.get("test"):
-            ways = {GIVEN: lambda: as_given(clips, learned, given["test"]), **ways}
+            ways = {GIVEN: lambda: as_given(clips, learned, given["test"], same=self.repeats), **ways}
         for name, way in ways.items():
             try:
                 self.splits[name] = way()
             except DataError as error:
                 self.skipped[name] = error.message
+
+    def held_out(self) -> Split:
+        """Folds of clips that are new to a model, for baseline and controls; by recording where one actor is left."""
+        clips, options = self.material.clips, self.options
+        if len({clip.actor for clip in clips}) > 1:
+            return by_actor(clips, seed=options.seed, same=self.repeats)
+        folds = min(options.folds, len({self.repeats.get(clip.name, clip.name) for clip in clips}))
+        return by_recording(clips, folds=folds, seed=options.seed, same=self.repeats)
 
     def run_all(self, learn: Learn) -> None:
         """Every protocol; one that can't be run is told of."""
@@ -236,7 +252,10 @@ class _Work:
             thresholds=thresholds_of(name, last),
             changes=changes,
             drifts=drifts,
-            warnings=warnings_of(data, material.clips, self.repeats, protocols),
+            warnings=(
+                *warnings_of(data, material.clips, self.repeats, protocols, notes=material.notes),
+                *warnings_of_split(material.splits, self.repeats),
+            ),
             libraries=library_versions(),
         )
         return Evaluated(result, self.runs)

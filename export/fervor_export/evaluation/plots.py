@@ -1,6 +1,7 @@
 """Plots of the report, as SVG text. Colours are safe for the colour-blind (Okabe & Ito), every axis says its unit."""
 
 import io
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from fervor.emotions import EMOTIONS
+from fervor_export.clip import Clip
 from fervor_export.evaluation.drift import Drift
 from fervor_export.evaluation.metrics import Figure
 from fervor_export.evaluation.protocols import BASELINE, NETWORK, Run
@@ -54,15 +56,17 @@ def scatter(run: Run) -> Callable[[Axes], None]:
         for mine, colour, name in ((~neutral, BLUE, "all but neutral"), (neutral, GREY, "neutral")):
             if mine.any():
                 x, y = (target + jitter)[mine], run.predictions[NETWORK][mine]
-                axes.scatter(x, y, s=size, color=colour, alpha=0.45, linewidths=0, label=name)
+                label = f"{name} (n = {mine.sum()})"
+                axes.scatter(x, y, s=size, color=colour, alpha=0.45, linewidths=0, label=label)
         _unit_square(axes, "intensity (share of observers)", "prediction, not learned from")
         axes.legend(loc="upper left", fontsize=8)
 
     return draw
 
 
-def by_emotion(protocol: ProtocolResult) -> Callable[[Axes], None]:
+def by_emotion(protocol: ProtocolResult, clips: Sequence[Clip]) -> Callable[[Axes], None]:
     """Correlation within each emotion, network beside baseline, with intervals and ceilings."""
+    counts = Counter(clip.emotion for clip in clips)
 
     def draw(axes: Axes) -> None:
         names = [emotion for emotion in EMOTIONS if emotion in protocol.predictor(NETWORK).scores.emotions]
@@ -76,8 +80,9 @@ def by_emotion(protocol: ProtocolResult) -> Callable[[Axes], None]:
                 name = "noise ceiling" if place == 0 else "_"
                 axes.hlines(most, place - 0.42, place + 0.42, color=RED, linewidth=1.4, label=name)
         axes.axhline(0, color="black", linewidth=0.6)
-        shown = [f"({name})" if name == "neutral" else name for name in names]
+        shown = [f"({name}) {counts[name]}" if name == "neutral" else f"{name} {counts[name]}" for name in names]
         axes.set_xticks(range(len(names)), shown, rotation=35, ha="right")
+        axes.set_xlabel("emotion, and how many clips")
         axes.set_ylabel("r within the emotion")
         axes.set_ylim(*_around(axes.get_ylim()))
         if axes.get_legend_handles_labels()[1]:
@@ -141,7 +146,7 @@ def over_minutes(drifts: Sequence[Drift]) -> Callable[[Axes], None]:
             middle = np.asarray([minute.p50 for minute in drift.minutes])
             low = middle - [minute.p5 for minute in drift.minutes]
             high = np.asarray([minute.p95 for minute in drift.minutes]) - middle
-            label = f"{drift.memory} (slope {drift.slope:+.4f} a minute)"
+            label = f"{drift.memory} (slope {drift.slope + 0.0:+.4f} a minute)"
             axes.errorbar(
                 x, middle, [low, high], color=colours[drift.memory], marker="o", ms=4, capsize=3, lw=1.2, label=label
             )

@@ -11,26 +11,29 @@ from fervor.emotions import UNKNOWN
 from fervor_export.evaluation import plots
 from fervor_export.evaluation.evaluate import ACTORS, GIVEN, HELD_OUT, RECORDINGS, Evaluated
 from fervor_export.evaluation.metrics import Figure
-from fervor_export.evaluation.protocols import BASELINE, NETWORK, PREDICTORS, Run
+from fervor_export.evaluation.protocols import NETWORK, PREDICTORS, Run
 from fervor_export.evaluation.result import Evaluation, ProtocolResult
-
-PAPER = {NETWORK: "about 0.8", BASELINE: "0.46"}
-"""Sun et al., section IV-C: Pearson r of five folds; whether copies of clips stood on both sides it does not say."""
+from fervor_export.evaluation.terminal import PAPER
 
 STYLE = """
-:root { color-scheme: light; }
-body { font: 15px/1.5 system-ui, sans-serif; color: #1c1c1c; max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
+:root { color-scheme: light dark; --ink: #1c1c1c; --page: #fff; --quiet: #555; --line: #dcdcdc; --code: #f2f2f2;
+  --warn: #fff3d6; --demo: #fde3dc; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6e6e6; --page: #16181b; --quiet: #a8a8a8; --line: #3a3d42;
+  --code: #26292e; --warn: #3a3018; --demo: #45241b; } }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--page);
+  max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
 h1 { font-size: 1.6rem; margin-bottom: 0; } h2 { font-size: 1.2rem; margin-top: 2.4rem; } h3 { font-size: 1rem; }
 table { border-collapse: collapse; margin: .8rem 0; } th, td { padding: .25rem .8rem .25rem 0; text-align: left; }
-thead th { border-bottom: 2px solid #1c1c1c; vertical-align: bottom; } tbody tr { border-bottom: 1px solid #e2e2e2; }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; } small { color: #666; }
+thead th { border-bottom: 2px solid var(--ink); vertical-align: bottom; }
+tbody tr { border-bottom: 1px solid var(--line); }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; } small { color: var(--quiet); }
 td { white-space: nowrap; } td small { display: block; font-size: .78rem; font-weight: 400; line-height: 1.2; }
-.main td { font-weight: 600; } .warn { background: #fff3d6; border-left: 5px solid #e69f00; padding: .6rem 1rem; }
-.warn.demo { background: #fde3dc; border-color: #d55e00; font-weight: 600; }
+.main td { font-weight: 600; } .warn { background: var(--warn); border-left: 5px solid #e69f00; padding: .6rem 1rem; }
+.warn.demo { background: var(--demo); border-color: #d55e00; font-weight: 600; }
 .plots { display: flex; flex-wrap: wrap; gap: 1rem 1.6rem; align-items: flex-start; }
-figure { margin: 0; flex: 0 1 29rem; } img { width: 100%; }
-figcaption { max-width: 30rem; color: #444; font-size: .88rem; }
-p.note { color: #444; max-width: 46rem; } code { background: #f2f2f2; padding: 0 .25em; }
+figure { margin: 0; flex: 0 1 29rem; } img { width: 100%; background: #fff; border-radius: 4px; }
+figcaption { max-width: 30rem; color: var(--quiet); font-size: .88rem; }
+p.note { color: var(--quiet); max-width: 46rem; } code { background: var(--code); padding: 0 .25em; }
 """
 
 Cell = str | Figure | float | int | None
@@ -99,7 +102,7 @@ def _main_table(result: Evaluation) -> list[str]:
             if predictor.name == name
             for cell in (predictor.scores.r_all, predictor.scores.r_within)
         ]
-        + [PAPER.get(name, "")]
+        + [_paper(name)]
         for name, title in PREDICTORS.items()
         if any(predictor.name == name for protocol in result.protocols for predictor in protocol.predictors)
     ]
@@ -115,6 +118,10 @@ def _main_table(result: Evaluation) -> list[str]:
     )
     table = _table(head, [*rows, [*ceilings, ""]], strong=(0, 1))
     return ["<h2>Pearson r</h2>", table, note]
+
+
+def _paper(name: str) -> str:
+    return f"about {PAPER[name]}" if name == NETWORK else PAPER.get(name, "")
 
 
 def _columns(protocol: ProtocolResult) -> tuple[str, str]:
@@ -150,8 +157,8 @@ def _protocol(protocol: ProtocolResult, run: Run) -> list[str]:
     ]
     levels = protocol.levels.balanced_accuracy
     drawn = [
-        (plots.scatter(run), 4.2, "Predictions of clips that were not learned from."),
-        (plots.by_emotion(protocol), 3.6, "Within each emotion; neutral is no intensity and stands apart."),
+        (plots.scatter(run), 4.2, _agreement(protocol)),
+        (plots.by_emotion(protocol, run.clips), 3.6, "Within each emotion; neutral is no intensity and stands apart."),
         (plots.calibration(protocol), 4.0, f"Calibration; expected error {_number(protocol.reliability.error)}."),
         (plots.by_seconds(protocol), 3.6, "By seconds seen; shorter clips count whole."),
         (
@@ -169,6 +176,13 @@ def _protocol(protocol: ProtocolResult, run: Run) -> list[str]:
         f'<div class="plots">{shown}</div>',
         *_trainings(protocol),
     ]
+
+
+def _agreement(protocol: ProtocolResult) -> str:
+    """What stands below the predictions."""
+    r = protocol.predictor(NETWORK).scores.r
+    interval = "" if r.low is None else f" [{_number(r.low)}, {_number(r.high)}]"
+    return f"Predictions of clips that were not learned from; r without neutral {_number(r.value)}{interval}."
 
 
 def _trainings(protocol: ProtocolResult) -> list[str]:
@@ -223,7 +237,7 @@ def _drift(result: Evaluation) -> list[str]:
         f"<p class='note'>{result.drifts[0].streams} streams of clips one after the other. Slope and difference are "
         "those of the estimate minus the estimate of the same frame from a fresh state.</p>"
     )
-    return ["<h2>Drift over minutes</h2>", _table(head, rows), note, plot]
+    return ["<h2>Drift over minutes</h2>", _table(head, rows), note, f'<div class="plots">{plot}</div>']
 
 
 def _thresholds(result: Evaluation) -> list[str]:
@@ -283,7 +297,8 @@ def _number(value: float | None) -> str:
     if value is None:
         return "-"
     digits = 4 if 0 < abs(value) < 0.01 else 3
-    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    shown = f"{value:.{digits}f}"
+    return shown.strip("-") if not float(shown) else shown.replace("-", "\N{MINUS SIGN}")
 
 
 def _figure(drawn: str, caption: str) -> str:

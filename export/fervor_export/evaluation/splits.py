@@ -93,13 +93,16 @@ def by_actor(
     return Split("actor", tuple(_without_repeats(fold, clips, same) for fold in split)) if same else split
 
 
-def as_given(clips: Sequence[Clip], train: Sequence[Clip], test: Sequence[Clip]) -> Split:
-    """The one fold that a data set brings along.
+def as_given(
+    clips: Sequence[Clip], train: Sequence[Clip], test: Sequence[Clip], *, same: Mapping[str, str] | None = None
+) -> Split:
+    """The one fold that a data set brings along, less what repeats a judged recording under another name.
 
     Args:
         clips: the data set.
         train: those of its clips that are learned from.
         test: those that are judged.
+        same: recording -> the recording it repeats (`duplicates.groups`).
 
     Raises:
         DataError: a recording is on both sides.
@@ -107,7 +110,7 @@ def as_given(clips: Sequence[Clip], train: Sequence[Clip], test: Sequence[Clip])
     assert_disjoint(train, test)
     sides = {id(clip) for clip in train}, {id(clip) for clip in test}
     learned, judged = (tuple(index for index, clip in enumerate(clips) if id(clip) in side) for side in sides)
-    return Split("recording", (Fold(learned, judged),))
+    return Split("recording", (_without_repeats(Fold(learned, judged), clips, same or {}),))
 
 
 def assert_disjoint(train: Sequence[Clip], test: Sequence[Clip], *, unit: Unit = "recording") -> None:
