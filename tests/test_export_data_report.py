@@ -60,7 +60,7 @@ def test_one_page_with_plots_and_nothing_beside_it(tmp_path: Path) -> None:
     page = html_report(data, summarise(data))
     assert "<script" not in page
     assert "&lt;script&gt;" in page
-    assert page.count("<img ") == len(plots(data)) == 5
+    assert page.count("<img ") == len(plots(data)) == 6
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
     assert page == html_report(data, summarise(data))
 

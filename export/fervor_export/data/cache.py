@@ -89,7 +89,7 @@ def _pack(motion: Motion) -> dict[str, npt.NDArray[Any]]:
         "masks": np.packbits(np.concatenate([phase.mask for phase in motion.phases])),
         "prints": np.stack([motion.prints, motion.mirrored]),
         "numbers": np.array([motion.poses, motion.t_poses, motion.rate_hz, motion.seconds]),
-        "words": np.array([motion.skeleton, motion.doubt]),
+        "words": np.array([motion.skeleton, motion.doubt, motion.bones]),
     }
 
 
@@ -105,7 +105,7 @@ def _unpack(arrays: Mapping[str, npt.NDArray[Any]]) -> Motion:
     masks = bits.astype(np.bool_).reshape(len(rotations), len(JOINTS))
     prints, mirrored = arrays["prints"]
     poses, t_poses, rate_hz, seconds = arrays["numbers"].tolist()
-    skeleton, doubt = arrays["words"].tolist()
+    skeleton, doubt, bones = arrays["words"].tolist()
     return Motion(
         phases=tuple(map(Phase, np.split(rotations, cuts), np.split(masks, cuts))),
         prints=prints,
@@ -116,4 +116,5 @@ def _unpack(arrays: Mapping[str, npt.NDArray[Any]]) -> Motion:
         skeleton=skeleton,
         t_poses=int(t_poses),
         doubt=doubt,
+        bones=bones,
     )

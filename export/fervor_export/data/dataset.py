@@ -15,6 +15,7 @@ from typing import Literal
 
 from fervor.errors import DataError
 from fervor_export.clip import Clip, digest
+from fervor_export.data.bones import shared_bones
 from fervor_export.data.cache import Ask, default_cache
 from fervor_export.data.ebmdb import find_metadata, list_ebmdb
 from fervor_export.data.ebmdb_names import RATE_HZ as EBMDB_HZ
@@ -34,6 +35,9 @@ CAST_CLIPS = 1000
 
 LEAK = "a leak between folds"
 """How the finding of a recording that is another actor's or split's too ends."""
+
+ONE_BODY = "have the same bones to the last digit, and others have others: one person under several names?"
+"""What is said of actors whose files show one body."""
 
 LENGTHS_APART_S = 0.25
 """How far a recording's length may be from what its name says."""
@@ -99,7 +103,9 @@ class Dataset:
             (bad, f"Rows and files left out, as they can't be used: {len(bad)}; `fervor data check` lists them."),
             (leaks, f"Recordings left out, as they repeat one of another actor or split: {leaks}."),
         )
-        return tuple(sentence for applies, sentence in said if applies)
+        bodies = (f"{finding.where[0].upper()}{finding.where[1:]} {ONE_BODY}" for finding in self.findings
+                  if finding.what == ONE_BODY)  # fmt: skip
+        return (*(sentence for applies, sentence in said if applies), *bodies)
 
 
 def load_dataset(
@@ -158,6 +164,8 @@ def check_dataset(
             _check_motion(listing, entry, answer)
         else:
             listing.unusable(entry.where, answer)
+    for people in shared_bones((entry.actor, motion.bones) for entry, motion in pairs):
+        listing.doubt(f"actors {', '.join(people)}", ONE_BODY)
     takes = _takes(listing, pairs)
     clips = [take.clip for take in takes if take.clip]
     actors = len({clip.actor for clip in clips})

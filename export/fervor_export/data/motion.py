@@ -19,6 +19,7 @@ from fervor.recordings.recording import rig_poses
 from fervor.rotations import angle_between, from_axis_angle
 from fervor.skeletons.rig import JOINTS, MIRROR, UPPER_BODY
 from fervor_export.clip import RATE_HZ, Phase
+from fervor_export.data.bones import bones_of
 from fervor_export.data.resample import on_grid, without_jumps
 
 MOST_PHASES = 4
@@ -69,6 +70,8 @@ class Motion:
     """Frames dropped at the beginning."""
     doubt: str
     """What is odd about it; empty where nothing is."""
+    bones: str = ""
+    """What files with equal bones share; empty where the kind of file brings none."""
 
 
 def read_motion(
@@ -105,6 +108,7 @@ def read_motion(
         skeleton=recording.skeleton.title,
         t_poses=t_poses,
         doubt=doubt or _oddity(times, local, observed),
+        bones=bones_of(file),
     )
 
 

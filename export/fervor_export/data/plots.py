@@ -2,7 +2,7 @@
 
 import io
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import matplotlib as mpl
 import numpy as np
@@ -11,11 +11,24 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from fervor.emotions import EMOTIONS
+from fervor.skeletons.rig import JOINTS
 from fervor_export.clip import Clip
-from fervor_export.data.dataset import Dataset
+from fervor_export.data.dataset import Dataset, Take
 from fervor_export.data.label import NEUTRAL
+from fervor_export.evaluation.standard_body import MIDHIP, points
 
 _INK = "#3b5b92"
+
+MOST_SKELETONS = 4
+"""Kinds of skeletons that are drawn."""
+
+LINES = (
+    (MIDHIP, "spine"), ("spine", "spine_mid"), ("spine_mid", "neck"), ("neck", "head"),
+    *((f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in (
+        ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "index"), ("hip", "knee"), ("knee", "ankle"))),
+    *((middle, f"{side}_{end}") for side in "lr" for middle, end in (("neck", "shoulder"), (MIDHIP, "hip"))),
+)  # fmt: skip
+"""Bones that are drawn, by their ends."""
 
 MOST_ACTORS = 40
 """Actors that are shown one by one."""
@@ -26,7 +39,7 @@ def plots(data: Dataset) -> dict[str, str]:
     clips = data.clips
     if not clips:
         return {}
-    with mpl.rc_context({"svg.hashsalt": "fervor", "svg.fonttype": "none", "font.size": 9}):
+    with mpl.rc_context({"svg.hashsalt": "fervor", "svg.fonttype": "path", "font.size": 9}):
         drawn = {"Clips by emotion and actor": _drawn(_table, clips, height=3.6)}
         if data.intense:
             drawn["Intensity by emotion"] = _drawn(_spread, data.intense)
@@ -34,7 +47,43 @@ def plots(data: Dataset) -> dict[str, str]:
         if any(clip.observers for clip in clips):
             drawn["Observers of a clip"] = _drawn(_observers, clips)
         drawn["Length of clips"] = _drawn(_lengths, clips)
+        if data.takes:
+            drawn["Skeletons: a pose from the middle of a clip, on the rig"] = _poses(data.takes)
     return drawn
+
+
+def _poses(takes: Sequence[Take]) -> str:
+    """One body for each kind of skeleton, from the front and from its left: axes that are taken wrongly are seen."""
+    kinds = {take.motion.skeleton: take for take in reversed(takes)}
+    shown = dict(sorted(kinds.items())[:MOST_SKELETONS])
+    figure = Figure(figsize=(7.2, 2.9 * len(shown)), layout="constrained")
+    FigureCanvasSVG(figure)
+    for row, (name, take) in zip(figure.subplots(len(shown), 2, squeeze=False), shown.items(), strict=True):
+        rotations, mask = take.motion.phases[0]
+        middle = len(rotations) // 2
+        at = {point: place[0] for point, place in points(rotations[middle : middle + 1]).items()}
+        for axes, (across, sign, title) in zip(
+            row, ((0, 1.0, "from the front"), (2, -1.0, "from its left")), strict=True
+        ):
+            _draw_body(axes, {point: (sign * place[across], place[1]) for point, place in at.items()})
+            axes.set_xlabel(title, fontsize=8)
+        unseen = [joint for index, joint in enumerate(JOINTS) if not mask[:, index].any()]
+        row[0].set_title(name, fontsize=8, loc="left")
+        row[1].set_title(f"never seen: {', '.join(unseen)}" if unseen else "all 13 joints seen", fontsize=8, loc="left")
+    return _svg(figure)
+
+
+def _draw_body(axes: Axes, at: Mapping[str, tuple[float, float]]) -> None:
+    """Bones between points in metres, the left ones orange."""
+    for start, end in LINES:
+        side = "#E69F00" if end.startswith("l_") else _INK
+        (x, y), (u, v) = at[start], at[end]
+        axes.plot([x, u], [y, v], color=side, linewidth=2, solid_capstyle="round", marker="o", ms=3)
+    axes.set_aspect("equal")
+    axes.set_xlim(-1.0, 1.0)
+    axes.set_ylim(-1.0, 0.9)
+    axes.set_xticks([])
+    axes.set_ylabel("m")
 
 
 def _drawn(draw: Callable[[Axes, Sequence[Clip]], None], clips: Sequence[Clip], *, height: float = 2.8) -> str:
@@ -43,6 +92,10 @@ def _drawn(draw: Callable[[Axes, Sequence[Clip]], None], clips: Sequence[Clip], 
     axes = figure.subplots()
     axes.spines[["top", "right"]].set_visible(False)
     draw(axes, clips)
+    return _svg(figure)
+
+
+def _svg(figure: Figure) -> str:
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()
@@ -71,7 +124,8 @@ def _spread(axes: Axes, clips: Sequence[Clip]) -> None:
         range(1, len(emotions) + 1), [f"{name}\n{len(mine)}" for name, mine in zip(emotions, shares, strict=True)]
     )
     axes.set_ylim(-0.02, 1.02)
-    axes.set_ylabel("intensity")
+    axes.set_ylabel("intensity, share of observers")
+    axes.set_xlabel("emotion, and how many clips; line: median, triangle: mean")
 
 
 def _shares(axes: Axes, clips: Sequence[Clip]) -> None:

@@ -20,12 +20,20 @@ SEVERITIES: Mapping[Severity, str] = {
 }
 """How findings are headed, in this order."""
 
+REPEATS = "Repeats: never on both sides of a fold"
+"""How the findings of less exact copies are headed."""
+
 GROUP_COLUMNS = ("clips", "minutes", "mean", "deviation", "ceiling")
 
-_STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222}
+_STYLE = """:root{color-scheme:light dark;--ink:#222;--page:#fff;--line:#ddd;--quiet:#555;--bad:#a00;--doubt:#850}
+@media(prefers-color-scheme:dark){:root{--ink:#e6e6e6;--page:#16181b;--line:#3a3d42;--quiet:#a8a8a8;--bad:#ff8a80;
+--doubt:#e6b566}}
+body{font:15px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:var(--ink);
+background:var(--page)}
 table{border-collapse:collapse;margin:.5rem 0 1.5rem}td,th{padding:.15rem .8rem;text-align:left;vertical-align:top;
-border-bottom:1px solid #ddd}td.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%}
-.unusable{color:#a00}.doubt{color:#850}code{font-size:90%}p.note{color:#555}"""
+border-bottom:1px solid var(--line);overflow-wrap:anywhere}td.n{text-align:right;font-variant-numeric:tabular-nums}
+img{max-width:100%;background:#fff;border-radius:4px}
+.unusable{color:var(--bad)}.doubt{color:var(--doubt)}p.note{color:var(--quiet)}"""
 
 
 def facts(summary: Summary) -> list[tuple[str, str]]:
@@ -34,7 +42,7 @@ def facts(summary: Summary) -> list[tuple[str, str]]:
     told = [
         ("data", summary.description),
         ("clips", f"{summary.clips} of {summary.recordings} recordings, {summary.hours:.2f} h"),
-        ("length of clips", f"{shortest:.1f} to {longest:.1f} s, median {median:.1f} s"),
+        ("length of clips", f"{shortest:.1f} to {longest:.1f} s, median {median:.1f} s" if summary.clips else ""),
         ("observers of a clip", _counted(summary.observers)),
         ("frames a second", _counted(summary.rates)),
         ("skeletons", _counted(summary.skeletons)),
@@ -63,7 +71,7 @@ def print_report(console: Console, data: Dataset, summary: Summary) -> None:
         console.print(shown)
     for severity, title in SEVERITIES.items():
         _print_findings(console, title, [finding for finding in data.findings if finding.severity == severity])
-    _print_findings(console, "Repeats: kept together in folds", _repeats(summary))
+    _print_findings(console, REPEATS, _repeats(summary))
 
 
 def _print_findings(console: Console, title: str, findings: Sequence[Finding]) -> None:
@@ -80,7 +88,7 @@ def html_report(data: Dataset, summary: Summary) -> str:
         f"<h2>{SEVERITIES[severity]} ({len(found)})</h2>{_html_findings(found)}" for severity, found in _sorted(data)
     ]
     if repeats := _repeats(summary):
-        parts.append(f"<h2>Repeats: kept together in folds ({len(repeats)})</h2>{_html_findings(repeats)}")
+        parts.append(f"<h2>{REPEATS} ({len(repeats)})</h2>{_html_findings(repeats)}")
     for title, others, groups in _group_tables(summary):
         head = (title.split()[-1], GROUP_COLUMNS[0], others, *GROUP_COLUMNS[1:])
         parts.append(f"<h2>{escape(title)}</h2>{_html_table(head, map(_cells, groups))}")
@@ -108,11 +116,7 @@ def _group_tables(summary: Summary) -> list[tuple[str, str, Sequence[Group]]]:
     """Title, what else is counted, and rows."""
     tables: list[tuple[str, str, Sequence[Group]]] = [
         ("Clips by emotion", "actors", summary.emotions),
-        (
-            "Apart, as recognised as neutral is no intensity: emotion",
-            "actors",
-            [summary.neutral] if summary.neutral else [],
-        ),
+        ("Apart, as it is no intensity: the neutral emotion", "actors", [summary.neutral] if summary.neutral else []),
         ("Clips by actor", "emotions", summary.actors),
     ]
     return [table for table in tables if table[2]]
