@@ -6,7 +6,8 @@ import pytest
 from bodies import motion, terms
 from fervor.errors import InputError
 from fervor.levels import Level
-from fervor.session.body import REMEMBERED, Body
+from fervor.session.answers import REMEMBERED
+from fervor.session.body import Body
 from fervor.session.events import Outcome, Pose
 
 ALL = np.ones(13, np.bool_)

@@ -9,6 +9,7 @@ from bodies import host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
 from fervor.protocol.messages import Checkpoint, Error, Estimate, Frame, SessionStart, SessionStarted
+from fervor.session.answers import Answers
 from fervor.session.checkpoint import Bond, Bookkeeping, Memory, pack, unpack
 from fervor.session.events import Close, Release, Reply, Restore, Ticket
 from fervor.session.sealing import Sealer
@@ -188,7 +189,7 @@ BODY = Bookkeeping(
 
 
 def test_another_model_is_a_mismatch_another_runtime_is_told():
-    data = pack(Bond("m", "f", "t"), BODY, Memory({"x": np.arange(3.0)}))
+    data = pack(Bond("m", "f", "t"), BODY, Answers().to_arrays(), Memory({"x": np.arange(3.0)}))
     opened = unpack(data, Bond("m", "g", "t"))
     assert not opened.same_runtime
     assert opened.memory.arrays["x"].tolist() == [0.0, 1.0, 2.0]

@@ -1,7 +1,7 @@
 """Answers wait for the last of their message."""
 
-from fervor.protocol.messages import Estimate
-from fervor.session.groups import Groups
+from fervor.protocol.messages import Checkpoint, Estimate
+from fervor.session.groups import Gathered, Groups
 
 
 def estimate(seq: int) -> Estimate:
@@ -17,19 +17,29 @@ def test_answers_come_together_in_the_order_of_their_frames():
     assert groups.close(group) is None
     groups.put(group, 0, estimate(7))
     assert groups.close(group) is None
-    answers = groups.close(group)
-    assert answers is not None
-    assert [answer.seq for answer in answers] == [7, 8]
+    gathered = groups.close(group)
+    assert gathered is not None
+    assert [answer.seq for answer in gathered.estimates] == [7, 8]
 
 
 def test_a_message_without_frames_under_way_ends_at_once():
     groups = Groups()
-    assert groups.close(groups.open()) == ()
+    assert groups.close(groups.open()) == Gathered((), ())
 
 
 def test_messages_do_not_mix():
     groups = Groups()
     first, second = groups.open(), groups.open()
     groups.put(second, 0, estimate(1))
-    assert groups.close(first) == ()
-    assert groups.close(second) == (estimate(1),)
+    assert groups.close(first) == Gathered((), ())
+    assert groups.close(second) == Gathered((estimate(1),), ())
+
+
+def test_checkpoints_follow_the_answers_and_the_newest_of_a_body_is_enough():
+    groups = Groups()
+    group = groups.open()
+    for seq, body in ((1, "a"), (2, "b"), (3, "a")):
+        groups.follow(group, Checkpoint(body=body, seq=seq, token="x"))
+    gathered = groups.close(group)
+    assert gathered is not None
+    assert [(message.body, message.seq) for message in gathered.followers] == [("b", 2), ("a", 3)]

@@ -4,7 +4,6 @@ A body holds scalars only; its recurrent tensors and poses live in the engine un
 """
 
 import math
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ from fervor.emotions import EMOTIONS, UNKNOWN
 from fervor.levels import LevelState, next_level
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
+from fervor.session.answers import Answers, Arrays
 from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
 from fervor.session.label import NO_LABEL, Label, make_label
@@ -26,9 +26,6 @@ WARM_UP_S = 1.0
 
 ENOUGH_JOINTS = 0.6
 """Share of the upper-body joints its sensor can see that a frame must show."""
-
-REMEMBERED = 64
-"""Estimates kept to answer duplicates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +57,7 @@ class Body:
         self._emotion = UNKNOWN
         self._pending: tuple[Flag, ...] = ()
         self._next_checkpoint = -math.inf  # seconds
-        self._answers: OrderedDict[int, Estimate] = OrderedDict()
-        self._under_way: set[int] = set()  # seqs planned and not concluded
+        self._answers = Answers()
         self._enough = _enough(terms)
 
     @property
@@ -79,11 +75,11 @@ class Body:
         self._terms = terms
         self._enough = _enough(terms)
         self.reset()
+        self._next_checkpoint = -math.inf  # those before are of terms that no longer hold
 
     def answered(self, seq: int) -> Estimate | None:
         """The estimate a duplicate of frame `seq` gets again; None if it is under way or forgotten."""
-        estimate = self._answers.get(seq)
-        return estimate and estimate.model_copy(update={"flags": (*estimate.flags, "duplicate")})
+        return _again(self._answers.find(seq))
 
     def plan(
         self,
@@ -93,29 +89,28 @@ class Body:
         *,
         emotion: str | Mapping[str, float] | None = None,
         group: int | None = None,
+        keep: bool = True,
     ) -> Ticket:
-        """The work that frame `seq` at `time` (seconds) brings.
+        """The work that frame `seq` at `time` (seconds) brings; a checkpoint with it where one is due, if `keep`.
 
         Raises:
             InputError: an emotion that is not known; the frame then left no trace.
         """
-        if emotion is not None:
-            self._label = make_label(emotion, time, self._terms.emotion_ttl_s)
+        label = self._label if emotion is None else make_label(emotion, time, self._terms.emotion_ttl_s)
         late = seq <= self.newest_seq
         lost = not bool(pose.observed.any())
         fresh = self._timeline is None
         moved = self._move(time, late=late, lost=lost)
         self.newest_seq = max(seq, self.newest_seq)
         if "late" not in moved.flags:
-            self._last = time
+            self._last, self._label = time, label
         flags: tuple[Flag, ...] = moved.flags
         if moved.fresh:
             flags, self._pending = (*self._pending, *flags), ()
         if lost:
             flags = (*flags, "lost")
-        if seq in self._under_way:
+        if self._answers.expect(seq):
             flags = ("duplicate",)
-        self._under_way.add(seq)
         self._timeline = moved.timeline
         self.in_flight += 1
         return Ticket(
@@ -130,12 +125,11 @@ class Body:
             flags=flags,
             since=moved.timeline.origin if moved.timeline else time,
             group=group,
-            checkpoint=self._keep() if self._is_due(time) else None,
+            checkpoint=self._keep() if keep and self._is_due(time) else None,
         )
 
-    def snapshot(self, time: float) -> Ticket:
+    def snapshot(self, time: float, group: int | None = None) -> Ticket:
         """A ticket that brings no work and no estimate, but a checkpoint of the body as it is after all others."""
-        self.in_flight += 1
         return Ticket(
             slot=self.slot,
             body=self.name,
@@ -147,6 +141,7 @@ class Body:
             steps=(),
             flags=(),
             since=time,
+            group=group,
             answer=False,
             checkpoint=self._keep(),
         )
@@ -162,8 +157,12 @@ class Body:
         level = None if self._level is None else (self._level.level, self._level.since)
         return ticket.checkpoint.model_copy(update={"level": level, "emotion": self._emotion})
 
+    def answers(self) -> Arrays:
+        """What it was answered so far, for a checkpoint."""
+        return self._answers.to_arrays()
+
     @classmethod
-    def restore(cls, kept: Bookkeeping, slot: int, terms: Terms) -> "Body":
+    def restore(cls, kept: Bookkeeping, answers: Answers, slot: int, terms: Terms) -> "Body":
         """The body as it was, in another slot."""
         vector, name, until = kept.label
         body = cls(kept.name, slot, terms, Label(np.array(vector, np.float32), name, until))
@@ -173,6 +172,7 @@ class Body:
         body._pending = kept.pending
         body._level = None if kept.level is None else LevelState(*kept.level)
         body._emotion = kept.emotion
+        body._answers = answers
         return body
 
     def _keep(self) -> Bookkeeping:
@@ -200,8 +200,7 @@ class Body:
     def conclude(self, ticket: Ticket, outcome: Outcome) -> Estimate:
         """The estimate for a ticket, in the order in which tickets were planned."""
         self.in_flight -= 1
-        self._under_way.discard(ticket.seq)
-        if "duplicate" in ticket.flags and (answer := self.answered(ticket.seq)):
+        if ticket.flags == ("duplicate",) and (answer := _again(self._answers.given(ticket.seq))):
             return answer
         if ticket.fresh:
             self._level = None
@@ -220,10 +219,14 @@ class Body:
             flags=(*ticket.flags, "jump") if outcome.jumped else ticket.flags,
             by_emotion=self._by_emotion(outcome),
         )
-        self._answers.setdefault(ticket.seq, estimate)  # a late copy of a frame under way must not replace its answer
-        if len(self._answers) > REMEMBERED:
-            self._answers.popitem(last=False)
+        self._answers.give(ticket.seq, estimate)
         return estimate
+
+    def fail(self, ticket: Ticket) -> None:
+        """There is no outcome for a ticket: the body starts anew."""
+        self.in_flight -= 1
+        self._answers.fail(ticket.seq)
+        self.reset()
 
     def _move(self, time: float, *, late: bool, lost: bool) -> Advance:
         """Where the frame stands in time; a late or empty one moves nothing."""
@@ -265,6 +268,10 @@ class Body:
         if not self._terms.by_emotion or outcome.intensity is None:
             return None
         return dict(zip(EMOTIONS, outcome.by_emotion.tolist(), strict=True))
+
+
+def _again(estimate: Estimate | None) -> Estimate | None:
+    return estimate and estimate.model_copy(update={"flags": (*estimate.flags, "duplicate")})
 
 
 def _enough(terms: Terms) -> float:

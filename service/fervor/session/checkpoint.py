@@ -1,11 +1,13 @@
 """A checkpoint: all that is needed to go on with a body as if nothing had happened, as bytes.
 
-Bookkeeping as JSON (Python's floats survive it to the bit), then the engine's arrays raw, little-endian. Bound to the
-model file, the protocol and the terms of the session: a state makes no sense under others. Who may make and read one is
-not decided here; see `fervor.session.sealing`.
+Bookkeeping as JSON (Python's floats survive it to the bit), then arrays raw, little-endian: the engine's, and the
+answers to the newest frames. All of it deflated, which halves it. Bound to the model file, the protocol and the terms
+of the session: a state makes no sense under others. Who may make and read one is not decided here; see
+`fervor.session.sealing`.
 """
 
 import hashlib
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -16,11 +18,13 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
 from fervor.levels import Level
 from fervor.protocol.messages import PROTOCOL, Flag
+from fervor.session.answers import Answers, Arrays
 
-FORMAT = 1
+FORMAT = 2
 """Version of these bytes."""
 
-Arrays = dict[str, npt.NDArray[np.generic]]
+_ANSWER = "answer."
+"""Prefix of the names of arrays that are a body's own, not the engine's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,13 +75,15 @@ class Opened:
     """A checkpoint that was read again."""
 
     body: Bookkeeping
+    answers: Answers
     memory: Memory
     same_runtime: bool
 
 
-def pack(bond: Bond, body: Bookkeeping, memory: Memory) -> bytes:
+def pack(bond: Bond, body: Bookkeeping, answers: Arrays, memory: Memory) -> bytes:
     """The bytes of a checkpoint."""
-    arrays = {name: np.asarray(array, order="C") for name, array in memory.arrays.items()}
+    own = {f"{_ANSWER}{name}": array for name, array in answers.items()}
+    arrays = {name: np.asarray(array, order="C") for name, array in (own | memory.arrays).items()}
     head = _Head(
         format=FORMAT,
         protocol=PROTOCOL,
@@ -89,7 +95,7 @@ def pack(bond: Bond, body: Bookkeeping, memory: Memory) -> bytes:
     ).model_dump_json()
     parts = [array.astype(array.dtype.newbyteorder("<"), copy=False).tobytes() for array in arrays.values()]
     encoded = head.encode()
-    return b"".join([len(encoded).to_bytes(4, "little"), encoded, *parts])
+    return zlib.compress(b"".join([len(encoded).to_bytes(4, "little"), encoded, *parts]), level=1)
 
 
 def unpack(data: bytes, bond: Bond) -> Opened:
@@ -99,11 +105,12 @@ def unpack(data: bytes, bond: Bond) -> Opened:
         CheckpointUnknown: these are no bytes of a checkpoint, or of another format or protocol.
         CheckpointMismatch: another model file, or another session's terms.
     """
-    size = int.from_bytes(data[:4], "little")
     try:
-        head = _Head.model_validate_json(data[4 : 4 + size])
-        memory = Memory(_arrays(data[4 + size :], head.arrays))
-    except (ValidationError, ValueError, TypeError):
+        inflated = zlib.decompress(data)
+        size = int.from_bytes(inflated[:4], "little")
+        head = _Head.model_validate_json(inflated[4 : 4 + size])
+        arrays = _arrays(inflated[4 + size :], head.arrays)
+    except (zlib.error, ValidationError, ValueError, TypeError):
         raise CheckpointUnknown("the checkpoint can't be read; expected a token as the service sent it") from None
     if (head.format, head.protocol) != (FORMAT, PROTOCOL):
         raise CheckpointUnknown(f"the checkpoint is of {head.protocol} format {head.format}; expected {PROTOCOL}")
@@ -113,7 +120,11 @@ def unpack(data: bytes, bond: Bond) -> Opened:
         raise CheckpointMismatch(
             "the checkpoint is of a session with other terms; send the same session.start, with resume added"
         )
-    return Opened(head.body, memory, head.fingerprint == bond.fingerprint)
+    own = {name.removeprefix(_ANSWER): array for name, array in arrays.items() if name.startswith(_ANSWER)}
+    memory = Memory({name: array for name, array in arrays.items() if not name.startswith(_ANSWER)})
+    return Opened(
+        head.body, Answers.from_arrays(head.body.name, own), memory, head.fingerprint == bond.fingerprint
+    )
 
 
 def digest(parts: Mapping[str, object]) -> str:

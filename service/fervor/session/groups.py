@@ -2,13 +2,25 @@
 
 from dataclasses import dataclass, field
 
-from fervor.protocol.messages import Estimate
+from fervor.protocol.messages import Checkpoint, Estimate, SessionCalibrated
+
+Follower = Checkpoint | SessionCalibrated
+"""What the client may build on only once it has the answers to all frames before."""
 
 
 @dataclass(slots=True)
 class _Group:
     waiting: int = 1  # one for the message itself, so that it can't end before all its frames are known
     estimates: dict[int, Estimate] = field(default_factory=dict)  # position in the message → answer
+    followers: dict[str, Follower] = field(default_factory=dict)  # by body, "" for the session
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """All answers to one message, in the order of its frames, and what follows them."""
+
+    estimates: tuple[Estimate, ...]
+    followers: tuple[Follower, ...]
 
 
 class Groups:
@@ -32,11 +44,18 @@ class Groups:
         """An answer to the frame at `place`."""
         self._groups[group].estimates[place] = estimate
 
-    def close(self, group: int) -> tuple[Estimate, ...] | None:
-        """One wait less; all answers in the order of their frames if it was the last, else None."""
+    def follow(self, group: int, message: Follower) -> None:
+        """Say this after the answers; of a body's checkpoints, the newest only."""
+        followers, body = self._groups[group].followers, message.body if isinstance(message, Checkpoint) else ""
+        followers.pop(body, None)  # so that the newest comes last
+        followers[body] = message
+
+    def close(self, group: int) -> Gathered | None:
+        """One wait less; all that was gathered if it was the last, else None."""
         gathered = self._groups[group]
         gathered.waiting -= 1
         if gathered.waiting:
             return None
         del self._groups[group]
-        return tuple(gathered.estimates[place] for place in sorted(gathered.estimates))
+        estimates = tuple(gathered.estimates[place] for place in sorted(gathered.estimates))
+        return Gathered(estimates, tuple(gathered.followers.values()))

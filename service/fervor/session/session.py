@@ -78,6 +78,7 @@ class Session:
         self._outcomes: dict[Ticket, Outcome | EngineError] = {}  # that wait for those of earlier tickets
         self._groups = Groups()
         self._calibrating: Calibrating | None = None
+        self._calibrated: dict[Ticket, SessionCalibrated] = {}  # told after the estimate of the last frame under way
         self._totals = Totals().model_dump()
 
     @property
@@ -120,12 +121,9 @@ class Session:
         events: list[Event] = []
         if isinstance(outcome, EngineError):
             events += self._fail(ticket, body, outcome)
-        else:
-            estimate = body.conclude(ticket, outcome)
-            events += self._deliver(ticket.group, place, estimate, body) if ticket.answer else []
-            events += self._checkpoint(ticket, body, outcome)
-        if ticket.group is not None:
-            events += self._close_group(ticket.group)
+        elif ticket.answer:
+            events += self._deliver(ticket.group, place, body.conclude(ticket, outcome), body)
+        events += self._follow(ticket, body, outcome)
         if self.state is SessionState.ENDING and not self._tickets:
             events += self._ended("ended by the client")
         return events
@@ -200,20 +198,27 @@ class Session:
             raise ProtocolError("resume names a body twice; expected its newest checkpoint only")
         resumed: list[Resumed] = []
         restores: list[Event] = []
+        if len(opened) > self._host.limits.max_bodies:
+            raise ProtocolError(f"resume has {len(opened)} bodies; this service takes {self._host.limits.max_bodies}")
         for kept in opened:
-            body = self._roster.restore(partial(Body.restore, kept.body, terms=self._agreed.terms))
+            body = self._roster.restore(partial(Body.restore, kept.body, kept.answers, terms=self._agreed.terms))
             restores.append(Restore(body.slot, kept.memory))
             resumed.append(Resumed(body=body.name, seq=body.newest_seq, same_runtime=kept.same_runtime))
         return tuple(resumed), restores
 
-    def checkpoints(self) -> list[Event]:
-        """Ask for a checkpoint of every body, after all that is under way; none unless the client takes them."""
+    def checkpoints(self, group: int | None = None) -> list[Event]:
+        """Ask for a checkpoint of every body, after all that is under way and, if any, the answers of `group`.
+
+        None unless the client takes them, and none of a body that holds a pose for a calibration.
+        """
         if self.state is not SessionState.OPEN or self._agreed.terms.checkpoint_s is None:
             return []
         tickets: list[Event] = []
         for body in self._roster:
-            if body.last is not None:
-                ticket = body.snapshot(body.last)
+            if body.last is not None and not self._is_held(body.name):
+                ticket = body.snapshot(body.last, group)
+                if group is not None:
+                    self._groups.expect(group)
                 self._tickets[ticket] = (body, -1)
                 tickets.append(ticket)
         return tickets
@@ -227,13 +232,27 @@ class Session:
     def _bond(self) -> Bond:
         return Bond(self._host.model.sha256, self._host.fingerprint, self._agreed.digest)
 
-    def _checkpoint(self, ticket: Ticket, body: Body, outcome: Outcome) -> list[Event]:
-        if ticket.checkpoint is None or outcome.memory is None or self._host.seal is None:
-            return []
-        if ticket.source != self._agreed.terms.source:
-            return []  # a calibration came between: this state belongs to terms that no longer hold
-        token = self._host.seal(pack(self._bond, body.bookkeeping(ticket), outcome.memory))
-        return [Reply(Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=token))]
+    def _is_held(self, body: str) -> bool:
+        """Whether a body holds its pose for a calibration, of which a checkpoint would know nothing."""
+        return self._calibrating is not None and self._calibrating.request.body == body
+
+    def _follow(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> list[Event]:
+        """What comes after a ticket's estimate: its checkpoint, and a calibration that ended with it."""
+        followers = [self._checkpoint(ticket, body, outcome), self._calibrated.pop(ticket, None)]
+        if ticket.group is None:
+            return [Reply(message) for message in followers if message is not None]
+        for message in followers:
+            if message is not None:
+                self._groups.follow(ticket.group, message)
+        return self._close_group(ticket.group)
+
+    def _checkpoint(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> Checkpoint | None:
+        if isinstance(outcome, EngineError) or ticket.checkpoint is None or outcome.memory is None:
+            return None
+        if self._host.seal is None or ticket.source != self._agreed.terms.source:
+            return None  # after a calibration, a state before it belongs to terms that no longer hold
+        content = pack(self._bond, body.bookkeeping(ticket), body.answers(), outcome.memory)
+        return Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=self._host.seal(content))
 
     def _frame(self, frame: Frame, group: int | None = None, place: int = 0) -> list[Event]:
         """The work of one frame. A bad one is told and leaves no trace."""
@@ -258,12 +277,13 @@ class Session:
         if frame.emotion is not None:
             emotion_vector(frame.emotion)  # before a body is opened for it: a bad frame leaves no trace
         body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
-        ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group)
+        keep = not self._is_held(frame.body)
+        ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep)
         self._tickets[ticket] = (body, place)
         if group is not None:
             self._groups.expect(group)
         self._note(ticket)
-        return [ticket, *self._calibrate(frame.body, time, pose)]
+        return [ticket, *self._calibrate(ticket, pose)]
 
     def _frames(self, message: Frames) -> list[Event]:
         most = self._host.limits.max_frames_per_message
@@ -274,10 +294,14 @@ class Session:
         return events + self._close_group(group)
 
     def _close_group(self, group: int) -> list[Event]:
-        answers = self._groups.close(group)
-        if answers and self._agreed.latest:
+        gathered = self._groups.close(group)
+        if gathered is None:
+            return []
+        answers = gathered.estimates
+        if self._agreed.latest:
             answers = tuple({answer.body: answer for answer in answers}.values())
-        return [Reply(Estimates(estimates=answers))] if answers else []
+        events: list[Event] = [Reply(Estimates(estimates=answers))] if answers else []
+        return [*events, *map(Reply, gathered.followers)]
 
     def _deliver(self, group: int | None, place: int, estimate: Estimate, body: Body) -> list[Event]:
         """Send an estimate, or put it with its group; delivery `latest` skips one that a newer is about to replace."""
@@ -287,32 +311,34 @@ class Session:
             return []
         return [] if self._agreed.latest and body.in_flight else [Reply(estimate)]
 
-    def _calibrate(self, body: str, time: float, pose: Pose) -> list[Event]:
-        """Hand a frame to the calibration under way; adopt its result."""
-        if self._calibrating is None or body != self._calibrating.request.body:
+    def _calibrate(self, ticket: Ticket, pose: Pose) -> list[Event]:
+        """Hand a frame to the calibration under way; adopt its result, told once this frame is answered."""
+        if self._calibrating is None or ticket.body != self._calibrating.request.body:
             return []
         name = self._calibrating.request.name
         try:
-            found = self._calibrating.add(time, pose)
+            found = self._calibrating.add(ticket.time, pose)
         except InputError as error:
             self._calibrating = None
-            return [Reply(_error(error).model_copy(update={"body": body}))]
+            return [Reply(_error(error).model_copy(update={"body": ticket.body}))]
         if found is None:
             return []
         self._calibrating = None
         self._agreement = self._agreed.aligned(found.skeleton)
         for known in self._roster:
             known.adopt(self._agreement.terms)
-        spec = SkeletonSpec.of(found.skeleton, name=name)
-        return [
-            Reply(
-                SessionCalibrated(skeleton=spec, frames=found.frames, spread_deg=found.spread_deg, unseen=found.unseen)
-            )
-        ]
+        self._calibrated[ticket] = SessionCalibrated(
+            skeleton=SkeletonSpec.of(found.skeleton, name=name),
+            frames=found.frames,
+            spread_deg=found.spread_deg,
+            unseen=found.unseen,
+        )
+        return self.checkpoints(ticket.group)  # those before are of terms that no longer hold
 
     def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
-        body.in_flight -= 1
-        body.reset("reset")
+        if not ticket.answer:
+            return []
+        body.fail(ticket)
         return [Reply(Error(code=error.code, message=error.message, fatal=False, body=ticket.body, seq=ticket.seq))]
 
     def _ended(self, reason: str) -> list[Event]:
@@ -325,6 +351,7 @@ class Session:
     def _release_all(self) -> list[Event]:
         self._tickets.clear()
         self._outcomes.clear()
+        self._calibrated.clear()
         return [*self._roster.clear()]
 
     def _note(self, ticket: Ticket) -> None:

@@ -57,19 +57,25 @@ class Agreement:
 
     @property
     def digest(self) -> str:
-        """What a checkpoint is bound to: everything agreed that shapes an estimate or the meaning of a frame."""
+        """What a checkpoint is bound to: everything agreed that shapes an estimate or the meaning of a frame.
+
+        A tree is known by what it is and not by its name, which a calibration may change.
+        """
         terms, known = self.terms, self.terms.source.skeleton
+        if isinstance(known, Landmarks):
+            kind: tuple[object, ...] = (known.name, known.joints, sorted(known.points.items()))
+        else:
+            kind = (known.joints, known.parents, known.drives, known.bind.tobytes())
         return digest(
             {
                 "joints": self.joints,
                 "order": self.order,
                 "axes": terms.source.axes,
-                "skeleton": known.name,
-                "tree": known.joints if isinstance(known, Landmarks) else (known.joints, known.parents, known.drives),
-                "bind": b"" if isinstance(known, Landmarks) else known.bind.tobytes(),
+                "skeleton": (*kind, known.noisy),
                 "clock": (terms.clock, self.frame_s),
                 "memory": terms.memory,
-                "emotion": (self.emotion, terms.emotion_ttl_s),
+                "emotion": (emotion_vector(self.emotion).tolist(), terms.emotion_ttl_s),
+                "kind of label": isinstance(self.emotion, str),
             }
         )
 
