@@ -1,5 +1,6 @@
 """Bytes to messages and back. One codec per subprotocol; a codec knows nothing of what was said before."""
 
+import json
 import re
 import reprlib
 from collections.abc import Mapping
@@ -8,7 +9,7 @@ from typing import Protocol, TypeVar
 import msgpack
 from pydantic import TypeAdapter, ValidationError
 
-from fervor.errors import MessageError
+from fervor.errors import FrameError, MessageError
 from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -58,7 +59,7 @@ class JsonCodec:
         try:
             return adapter.validate_json(data, strict=True)
         except ValidationError as error:
-            raise MessageError(one_sentence(error)) from None
+            raise _refusal(error, _parsed(data)) from None
 
 
 class MsgpackCodec:
@@ -87,11 +88,13 @@ class MsgpackCodec:
                 f"{MsgpackCodec.subprotocol} takes binary messages, but {len(data)} characters of text came"
             )
         try:
-            return adapter.validate_python(msgpack.unpackb(data, use_list=False))
-        except ValidationError as error:
-            raise MessageError(one_sentence(error)) from None
+            unpacked = msgpack.unpackb(data, use_list=False)
         except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
             raise MessageError(f"the message is not MessagePack: {error or type(error).__name__}") from None
+        try:
+            return adapter.validate_python(unpacked)
+        except ValidationError as error:
+            raise _refusal(error, unpacked) from None
 
 
 KEEP_NULLS = frozenset({"estimate", "estimates", "frame", "frames"})
@@ -117,6 +120,25 @@ def one_sentence(error: ValidationError) -> str:
     came = first["input"]
     shown = reprlib.repr(came) if isinstance(came, dict | list | tuple) else repr(came)  # a container may be huge
     return f"{place}: {problem[0].lower()}{problem[1:]}, but {shown if len(shown) <= 60 else shown[:57] + '...'} came"
+
+
+def _parsed(data: str) -> object:
+    """The JSON of a message that was refused; None where it is none."""
+    try:
+        return json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _refusal(error: ValidationError, message: object) -> MessageError:
+    """Why a message is refused; of a frame it names body and seq, where those can be read."""
+    sentence = one_sentence(error)
+    if not isinstance(message, dict) or message.get("type") != "frame":
+        return MessageError(sentence)
+    body, seq = message.get("body", "0"), message.get("seq")
+    if not isinstance(body, str) or type(seq) is not int:
+        return MessageError(sentence)
+    return FrameError(f"frame {seq} of body {body[:64]!r}: {sentence}", body=body[:64], seq=seq)
 
 
 def _place(loc: tuple[int | str, ...]) -> str:

@@ -100,6 +100,8 @@ class Session:
             return []
         if not error.fatal and self.state is SessionState.NEW:
             error = ProtocolError(f"the session could not start: {error.message}")
+        if isinstance(error, FrameError) and error.seq is not None:
+            self._count("rejected")
         reply = Reply(_error(error))
         return [reply, *self._close(error.close_code, error.code)] if error.close_code else [reply]
 
@@ -154,7 +156,7 @@ class Session:
                 self._count("resets")
                 return []
             case BodyEnd():
-                return [self._roster.end(message.body)]
+                return [self._roster.end(message.body), *self._let_go(message.body)]
             case SessionCalibrate():
                 self._calibrating = Calibrating.begin(message, self._agreed.terms.source)
                 return []
@@ -279,6 +281,8 @@ class Session:
         body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
         keep = not self._is_held(frame.body)
         ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep)
+        if known is None and self._calibrating is not None and not keep:  # somebody new: the pose is held from here on
+            self._calibrating = Calibrating.begin(self._calibrating.request, agreement.terms.source)
         self._tickets[ticket] = (body, place)
         if group is not None:
             self._groups.expect(group)
@@ -334,6 +338,14 @@ class Session:
             unseen=found.unseen,
         )
         return self.checkpoints(ticket.group)  # those before are of terms that no longer hold
+
+    def _let_go(self, body: str) -> list[Event]:
+        """A body is gone, and with it the calibration that its pose was held for."""
+        if not self._is_held(body):
+            return []
+        self._calibrating = None
+        error = InputError(f"body {body!r} ended before its pose was held long enough; nothing changed")
+        return [Reply(_error(error).model_copy(update={"body": body}))]
 
     def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
         if not ticket.answer:
