@@ -8,7 +8,7 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check install --quiet --con
 # Slow proofs run in CI; `make test MARKS=` runs them here.
 MARKS  ?= $(if $(CI),,-m "not slow")
 
-.PHONY: help run test lint types audit bench clean
+.PHONY: help run test lint types audit bench soak clean
 .DEFAULT_GOAL := help
 
 help: ## what there is to say
@@ -33,6 +33,11 @@ audit: $(VENV)/audit.stamp ## ask PyPI for known holes in the pinned versions (n
 
 bench: $(VENV)/dev.stamp ## speed, beside a naive service and a floor in C
 	@$(BIN)/python -m bench
+
+SECONDS ?= 600
+
+soak: $(VENV)/dev.stamp ## a service under churn for SECONDS=600: fails if it grows
+	@$(BIN)/python -m bench.soak --seconds $(SECONDS)
 
 clean: ## forget the environment and everything made
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -30,7 +30,13 @@ KINDS = 5
 RATE_HZ, SECONDS = 20.0, 120
 FRAMES = int(RATE_HZ * SECONDS)
 LABELS = {100: "fear", 777: {"joy": 0.6, "pride": 0.3}, 1500: "unknown", 1600: "sadness"}
-OPTIONS = {"emotion": "joy", "checkpoint_s": 2.0, "retry_for": None, "open_timeout": 30.0, "on_reconnect": lambda _: None}
+OPTIONS = {
+    "emotion": "joy",
+    "checkpoint_s": 2.0,
+    "retry_for": None,
+    "open_timeout": 30.0,
+    "on_reconnect": lambda _: None,
+}
 
 Told = list[Estimate]
 
@@ -101,7 +107,7 @@ def poses(kind: int):
 def sync_stream(url: str, kind: int) -> tuple[Told, int]:
     while True:  # a first connection is the caller's to try again
         with suppress(fervor_client.Unreachable, fervor_client.Overloaded):
-            session = fervor_client.sync.connect(url, **OPTIONS)
+            session = fervor_client.sync.connect(url, **OPTIONS, on_reconnect=lambda _: None)
             break
     with session:
         for seq, pose in enumerate(poses(kind)):
@@ -113,7 +119,7 @@ def sync_stream(url: str, kind: int) -> tuple[Told, int]:
 async def async_stream(url: str, kind: int) -> tuple[Told, int]:
     while True:
         with suppress(fervor_client.Unreachable, fervor_client.Overloaded):
-            session = await fervor_client.connect(url, **OPTIONS)
+            session = await fervor_client.connect(url, **OPTIONS, on_reconnect=lambda _: None)
             break
     async with session:
         for seq, pose in enumerate(poses(kind)):

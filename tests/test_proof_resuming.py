@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import event, settings
+from hypothesis import event as note
+from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
@@ -267,7 +268,7 @@ class Interrupted(RuleBasedStateMachine):
         lost=st.sampled_from([(), (), (1, 5), tuple(range(25))]),
         parcel=st.booleans(),
     )
-    def move(self, body, frames, pace, pause, label, lost, parcel):
+    def move(self, *, body, frames, pace, pause, label, lost, parcel):
         self.time += pause
         sent = []
         for number in range(frames):
@@ -341,7 +342,7 @@ class Interrupted(RuleBasedStateMachine):
         self.service.hear(start)
         started = self.service.said.popleft()
         assert isinstance(started, SessionStarted), started
-        event(f"cut with {len(start.resume)} checkpoints")
+        note(f"cut with {len(start.resume)} checkpoints")
         assert len(started.resumed) == len(start.resume)
         assert all(resumed.same_runtime for resumed in started.resumed)
         for entry in list(self.client.log):
@@ -382,7 +383,7 @@ class Interrupted(RuleBasedStateMachine):
     def _heard(self, client, message) -> None:
         client.hears(message)
         if isinstance(message, SessionCalibrated):
-            event("calibrated")
+            note("calibrated")
             self.still.clear()
 
     def _listen(self, most: int) -> None:

@@ -67,7 +67,11 @@ def test_every_example_is_a_message_by_the_schema_and_by_the_codec(name):
 
 def test_a_quaternion_has_four_numbers_in_the_schema_too():
     schema = DOCUMENT["components"]["messages"]["Frame"]["payload"] | {"components": DOCUMENT["components"]}
-    for wrong in ({"type": "frame", "seq": 0, "q": [[0, 0, 1]]}, {"type": "frame", "seq": 0, "q": [[0, 0, 0, "1"]]}, {"seq": 0}):
+    for wrong in (
+        {"type": "frame", "seq": 0, "q": [[0, 0, 1]]},
+        {"type": "frame", "seq": 0, "q": [[0, 0, 0, "1"]]},
+        {"seq": 0},
+    ):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.Draft7Validator(schema).validate(wrong)
 

@@ -10,7 +10,7 @@ import json
 import struct
 import sys
 import threading
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +91,6 @@ class Player:
         self._services = ExitStack()
         self._settings = lines[0]["settings"]
         self._socket: Any = None
-        self._raw: Any = None
         self._stopping: threading.Thread | None = None
 
     async def play(self) -> list[Line]:
@@ -166,12 +165,10 @@ class Player:
         return line
 
     async def _closed(self, line: Line) -> Line:
-        try:
+        with suppress(websockets.ConnectionClosed):
             extra = await self._socket.recv()
-        except websockets.ConnectionClosed as closed:
-            assert closed.rcvd is not None
-            return self._checked(line, {"closed": closed.rcvd.code})
-        raise AssertionError(f"the service says {extra!r:.300}")
+            raise AssertionError(f"the service says {extra!r:.300}")
+        return self._checked(line, {"closed": self._socket.close_code})
 
     async def _cut(self, line: Line) -> Line:
         self._socket.transport.abort()

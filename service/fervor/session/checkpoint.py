@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
@@ -122,9 +121,7 @@ def unpack(data: bytes, bond: Bond) -> Opened:
         )
     own = {name.removeprefix(_ANSWER): array for name, array in arrays.items() if name.startswith(_ANSWER)}
     memory = Memory({name: array for name, array in arrays.items() if not name.startswith(_ANSWER)})
-    return Opened(
-        head.body, Answers.from_arrays(head.body.name, own), memory, head.fingerprint == bond.fingerprint
-    )
+    return Opened(head.body, Answers.from_arrays(head.body.name, own), memory, head.fingerprint == bond.fingerprint)
 
 
 def digest(parts: Mapping[str, object]) -> str:
