@@ -153,7 +153,7 @@ class Conversation(Standing):
         """Make the service take its alignment from the frames that follow; after a cut it is asked again."""
         self.must_be_open()
         payload = self._codec.encode(request)
-        self._line.log.add_calibrate(payload)
+        self._line.log.add_calibrate(request.body, payload)
         self._line.post(payload)
         self._calibrating, self._calibration = True, None
 

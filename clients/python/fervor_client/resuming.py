@@ -56,8 +56,8 @@ class Log:
         self._tracks: dict[str, Track] = {}
         self._open: dict[Key, Entry] = {}  # frames under way
         self._calibrate: Entry | None = None
+        self._held = ""  # the body whose frames it rests on
         self._place = 0
-        self._barrier = -1  # checkpoints of messages up to this place are of terms that no longer hold
 
     # --- what is sent -------------------------------------------------------------------------------------------------
 
@@ -94,9 +94,11 @@ class Log:
         if track is not None and track.here:
             self._end(body, track, payload)
 
-    def add_calibrate(self, payload: Payload) -> None:
-        """A calibration was asked for, in place of any before."""
+    def add_calibrate(self, body: str, payload: Payload) -> None:
+        """A calibration from a pose of `body` was asked for, in place of any before."""
+        before, self._held = self._held, body
         self._calibrate = Entry(self._next_place(), payload)
+        self._bury_by_name(before)
 
     # --- what comes ---------------------------------------------------------------------------------------------------
 
@@ -138,13 +140,14 @@ class Log:
 
     def calibrated(self) -> None:
         """New terms are in force: checkpoints of the old ones are void, and the bodies were reset."""
-        self._calibrate, self._barrier = None, self._place
+        self.calibration_failed()
         for track in self._tracks.values():
             track.give_up()
 
     def calibration_failed(self) -> None:
         """Nothing came of it."""
-        self._calibrate = None
+        self._calibrate, held = None, self._held
+        self._bury_by_name(held)
 
     # --- going on -----------------------------------------------------------------------------------------------------
 
@@ -209,7 +212,7 @@ class Log:
     # --- bookkeeping --------------------------------------------------------------------------------------------------
 
     def _covers(self, message: Checkpoint, entry: Entry) -> bool:
-        return entry.seq == message.seq and entry.place > self._barrier and (entry.answered or self._latest)
+        return entry.seq == message.seq and (entry.answered or self._latest)
 
     def _next_place(self) -> int:
         self._place += 1
@@ -243,7 +246,13 @@ class Log:
         track.end(self._append(track, payload))
         self._bury(name, track)
 
+    def _bury_by_name(self, name: str) -> None:
+        if name in self._tracks:
+            self._bury(name, self._tracks[name])
+
     def _bury(self, name: str, track: Track) -> None:
+        if self._calibrate is not None and name == self._held:
+            return  # what a calibration under way rests on is needed, even of a body that has gone
         track.bury()
         if not track.entries and not track.here and not track.token and not track.unlabelled:
             self._tracks.pop(name, None)

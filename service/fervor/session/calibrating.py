@@ -35,6 +35,11 @@ class Calibrating:
             raise InputError(f"{source.skeleton.name!r} sends positions, which need no calibration")
         return cls(request, source.skeleton, source.axes, facing(request.up, request.forward))
 
+    @property
+    def begun(self) -> bool:
+        """Whether a frame came."""
+        return self._start is not None
+
     def add(self, time: float, pose: Pose) -> Calibration | None:
         """Take a frame; the calibration once the pose was held long enough.
 

@@ -31,6 +31,9 @@ class Roster:
     def __iter__(self) -> Iterator[Body]:
         return iter(self._bodies.values())
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._bodies
+
     def find(self, name: str, time: float) -> Body | None:
         """The body called `name`, if it is there and at `time` (seconds, client clock) not to be forgotten."""
         body = self._bodies.get(name)

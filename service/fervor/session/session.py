@@ -279,15 +279,14 @@ class Session:
         if frame.emotion is not None:
             emotion_vector(frame.emotion)  # before a body is opened for it: a bad frame leaves no trace
         body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
+        gone = [] if known is not None else self._let_go_of_forgotten(frame.body)
         keep = not self._is_held(frame.body)
         ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep)
-        if known is None and self._calibrating is not None and not keep:  # somebody new: the pose is held from here on
-            self._calibrating = Calibrating.begin(self._calibrating.request, agreement.terms.source)
         self._tickets[ticket] = (body, place)
         if group is not None:
             self._groups.expect(group)
         self._note(ticket)
-        return [ticket, *self._calibrate(ticket, pose)]
+        return [*gone, ticket, *self._calibrate(ticket, pose)]
 
     def _frames(self, message: Frames) -> list[Event]:
         most = self._host.limits.max_frames_per_message
@@ -340,12 +339,19 @@ class Session:
         return self.checkpoints(ticket.group)  # those before are of terms that no longer hold
 
     def _let_go(self, body: str) -> list[Event]:
-        """A body is gone, and with it the calibration that its pose was held for."""
-        if not self._is_held(body):
+        """A body is gone, and with it the calibration that its pose was held for; one that waits for it goes on to."""
+        if self._calibrating is None or not self._calibrating.begun or not self._is_held(body):
             return []
         self._calibrating = None
-        error = InputError(f"body {body!r} ended before its pose was held long enough; nothing changed")
+        error = InputError(f"body {body!r} was gone before its pose was held long enough; nothing changed")
         return [Reply(_error(error).model_copy(update={"body": body}))]
+
+    def _let_go_of_forgotten(self, newcomer: str) -> list[Event]:
+        """A newcomer takes the place of bodies that were idle, its own former self among them."""
+        if self._calibrating is None:
+            return []
+        held = self._calibrating.request.body
+        return self._let_go(held) if held == newcomer or held not in self._roster else []
 
     def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
         if not ticket.answer:
