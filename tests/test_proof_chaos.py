@@ -31,13 +31,7 @@ KINDS = 5
 RATE_HZ, SECONDS = 12.0, 120  # the model's grid still has 30 steps a second
 FRAMES = int(RATE_HZ * SECONDS)
 LABELS = {100: "fear", 777: {"joy": 0.6, "pride": 0.3}, 1200: "unknown", 1300: "sadness"}
-OPTIONS = {
-    "emotion": "joy",
-    "checkpoint_s": 2.0,
-    "retry_for": None,
-    "open_timeout": 10.0,
-    "on_reconnect": lambda _: None,
-}
+OPTIONS = {"emotion": "joy", "checkpoint_s": 2.0, "retry_for": None, "open_timeout": 10.0}
 
 Told = list[Estimate]
 

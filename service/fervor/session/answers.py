@@ -5,8 +5,8 @@ Which frames are remembered follows from the frames alone, never from how far th
 """
 
 from collections import Counter, OrderedDict
-from collections.abc import Iterable
-from typing import get_args
+from collections.abc import Iterable, Mapping
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -104,21 +104,20 @@ class Answers:
         return answers
 
 
-def _estimate(body: str, columns: dict[str, list[object]], row: int) -> Estimate:
-    at = {name: column[row] for name, column in columns.items() if name != "by_emotion"}
-    by_emotion = columns["by_emotion"][row] if columns["by_emotion"] else None
-    none = at["intensity"] != at["intensity"]  # nan
-    return Estimate.model_validate(
-        {
-            **at,
-            "body": body,
-            "intensity": None if none else at["intensity"],
-            "level": _LEVELS[at["level"]],  # type: ignore[index]  # an integer, or the caller's TypeError
-            "emotion": _LABELS[at["emotion"]],  # type: ignore[index]
-            "status": _STATUSES[at["status"]],  # type: ignore[index]
-            "flags": tuple(flag for bit, flag in enumerate(_FLAGS) if at["flags"] >> bit & 1),  # type: ignore[operator]
-            "by_emotion": None if none or by_emotion is None else dict(zip(EMOTIONS, by_emotion, strict=True)),  # type: ignore[call-overload]
-        }
+def _estimate(body: str, columns: Mapping[str, Any], row: int) -> Estimate:
+    intensity = columns["intensity"][row]
+    none = bool(np.isnan(intensity))
+    shares = None if none or not columns["by_emotion"] else columns["by_emotion"][row]
+    return Estimate(
+        body=body,
+        seq=columns["seq"][row],
+        t=columns["t"][row],
+        intensity=None if none else intensity,
+        level=_LEVELS[columns["level"][row]],
+        emotion=_LABELS[columns["emotion"][row]],
+        status=_STATUSES[columns["status"][row]],
+        flags=tuple(flag for bit, flag in enumerate(_FLAGS) if columns["flags"][row] >> bit & 1),
+        by_emotion=None if shares is None else dict(zip(EMOTIONS, shares, strict=True)),
     )
 
 

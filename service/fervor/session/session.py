@@ -318,6 +318,8 @@ class Session:
         """Hand a frame to the calibration under way; adopt its result, told once this frame is answered."""
         if self._calibrating is None or ticket.body != self._calibrating.request.body:
             return []
+        if {"late", "duplicate"} & set(ticket.flags):
+            return []  # neither changes anything
         name = self._calibrating.request.name
         try:
             found = self._calibrating.add(ticket.time, pose)
