@@ -8,7 +8,18 @@ from hypothesis import strategies as st
 from bodies import host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
-from fervor.protocol.messages import Checkpoint, Error, Estimate, Frame, SessionStart, SessionStarted
+from fervor.protocol.messages import (
+    BodyEnd,
+    Checkpoint,
+    Error,
+    Estimate,
+    Frame,
+    Frames,
+    SessionCalibrate,
+    SessionStart,
+    SessionStarted,
+)
+from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.answers import Answers
 from fervor.session.checkpoint import Bond, Bookkeeping, Memory, pack, unpack
 from fervor.session.events import Close, Release, Reply, Restore, Ticket
@@ -21,9 +32,9 @@ SEALER = Sealer((b"key",), 60.0)
 class Replica:
     """A service with the common key, and one session on it."""
 
-    def __init__(self) -> None:
+    def __init__(self, **limits) -> None:
         self.engine = Engine(model(), capacity=8)
-        base = host(self.engine.claim)
+        base = host(self.engine.claim, **limits)
         self.session = Session(
             "s",
             type(base)(
@@ -201,3 +212,108 @@ def test_another_model_is_a_mismatch_another_runtime_is_told():
 def test_no_bytes_raise_anything_else(data):
     with pytest.raises(CheckpointUnknown):
         unpack(data, Bond("m", "f", "t"))
+
+
+def still(seq: int, *, body: str = "eve", joints: int = 25, **more) -> Frame:
+    return Frame(body=body, seq=seq, t=seq / 30, q=((0.0, 0.0, 0.0, 1.0),) * joints, **more)
+
+
+def kinds(said) -> list[str]:
+    return [message.type for message in said]
+
+
+def test_a_duplicate_of_a_frame_before_the_checkpoint_gets_its_answer_again():
+    replica, start = Replica(), SessionStart(checkpoint_s=1.0)
+    replica.say(start)
+    life = a_life(5, count=90)
+    said = run(replica, life)
+    token = [message for message in said if isinstance(message, Checkpoint)][-1]
+    expected = replica.say(life[token.seq - 20])
+    other = Replica()
+    other.say(start.model_copy(update={"resume": (token.token,)}))
+    assert other.say(life[token.seq - 20]) == expected
+    assert expected[0].flags[-1] == "duplicate"
+
+
+def test_a_late_frame_brings_no_label():
+    replica = Replica()
+    replica.say(SessionStart(skeleton="kinect_v2", emotion="joy"))
+    run(replica, [still(0), still(5)])
+    (late,) = replica.say(still(3, emotion="fear"))
+    (after,) = replica.say(still(6))
+    assert ("late" in late.flags, after.emotion) == (True, "joy")
+
+
+def test_a_checkpoint_comes_after_the_answers_of_its_message():
+    replica = Replica()
+    replica.say(SessionStart(checkpoint_s=0.1))
+    said = replica.say(Frames(frames=tuple(a_life(1, count=20))))
+    assert kinds(said) == ["estimates", "checkpoint"]
+    assert said[1].seq <= said[0].estimates[-1].seq
+
+
+def test_a_calibration_follows_its_last_frame_and_is_followed_by_checkpoints():
+    replica = Replica()
+    replica.say(SessionStart(skeleton="kinect_v2", checkpoint_s=0.1))
+    run(replica, [still(0), still(1, body="bob")])
+    replica.say(SessionCalibrate(body="eve", seconds=0.3))
+    said = run(replica, [still(seq) for seq in range(2, 12)])
+    assert kinds(said) == [*["estimate"] * 10, "session.calibrated", "checkpoint", "checkpoint"]
+    assert [message.body for message in said[-2:]] == ["eve", "bob"]
+    spec = said[10].skeleton
+    start = SessionStart(skeleton=spec, checkpoint_s=0.1)
+    (started,) = Replica().say(start.model_copy(update={"resume": tuple(message.token for message in said[-2:])}))
+    assert [(body.body, body.seq) for body in started.resumed] == [("eve", 11), ("bob", 1)]
+
+
+def test_a_calibration_ends_with_its_body():
+    replica = Replica()
+    replica.say(SessionStart(skeleton="kinect_v2"))
+    replica.say(still(0))
+    replica.say(SessionCalibrate(body="eve"))
+    replica.say(still(1))
+    (error,) = replica.say(BodyEnd(body="eve"))
+    assert (error.code, error.body, error.seq) == ("bad_input", "eve", None)
+    assert "was gone before its pose was held" in error.message
+
+
+def test_more_bodies_than_a_session_may_have_are_not_resumed():
+    replica, start = Replica(), SessionStart(checkpoint_s=1.0)
+    replica.say(start)
+    tokens = tuple(
+        next(s for s in replica.say(a_life(1, body=f"b{n}")[0]) if isinstance(s, Checkpoint)).token for n in range(3)
+    )
+    other = Replica(max_bodies=2)
+    (error,) = other.say(start.model_copy(update={"resume": tokens}))
+    assert (error.code, error.fatal, other.engine.slots.taken) == ("bad_message", True, 0)
+
+
+def test_a_drain_leaves_out_no_estimate_of_delivery_latest():
+    replica = Replica()
+    replica.say(SessionStart(delivery="latest", checkpoint_s=60.0))
+    first, *_ = a_life(1)
+    ticket, *_ = replica.session.receive(first)
+    (snapshot,) = replica.session.checkpoints()
+    outcomes = [replica.engine.run([each])[0] for each in (ticket, snapshot)]
+    assert kinds(replica.carry(replica.session.conclude(ticket, outcomes[0]))) == ["estimate", "checkpoint"]
+    assert kinds(replica.carry(replica.session.conclude(snapshot, outcomes[1]))) == ["checkpoint"]
+
+
+def test_a_token_is_bound_to_what_a_skeleton_is_and_not_to_its_name():
+    spec = {"joints": ("a", "b"), "parents": (-1, 0), "segments": {"pelvis": "a", "thorax": "b"}}
+    start = SessionStart(skeleton=SkeletonSpec(name="mine", **spec), checkpoint_s=1.0)
+    replica = Replica()
+    replica.say(start)
+    token = replica.say(still(0, joints=2))[-1].token
+    for name, noisy, taken in (("yours", False, True), ("mine", True, False)):
+        again = SessionStart(skeleton=SkeletonSpec(name=name, noisy=noisy, **spec), checkpoint_s=1.0, resume=(token,))
+        assert isinstance(Replica().say(again)[0], SessionStarted) is taken
+
+
+@pytest.mark.parametrize("memory", ["staggered", "stateful", "window"])
+def test_tokens_are_as_long_as_the_documents_say(memory):
+    replica = Replica()
+    replica.say(SessionStart(skeleton="kinect_v2", memory=memory, checkpoint_s=1.0, emotion="joy", by_emotion=True))
+    said = run(replica, a_life(2, joints=25, count=400))
+    longest = max(len(message.token) for message in said if isinstance(message, Checkpoint))
+    assert longest <= {"staggered": 12_000, "stateful": 10_000, "window": 40_000}[memory]

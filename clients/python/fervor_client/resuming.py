@@ -102,12 +102,14 @@ class Log:
 
     # --- what comes ---------------------------------------------------------------------------------------------------
 
-    def answered(self, keys: Iterable[Key]) -> None:
-        """These frames have their estimates."""
+    def answered(self, keys: Iterable[Key], *, late: bool = False) -> None:
+        """These frames have their estimates; a `late` one changed nothing."""
         for key in keys:
             entry, track = self._open.pop(key, None), self._tracks.get(key[0])
             if entry is None or track is None:
                 continue
+            if late:
+                entry.label = None
             track.answered(entry)
             self._bury(key[0], track)
 
