@@ -55,7 +55,14 @@ class Churn:
 
     @asynccontextmanager
     async def _talk(self, **options: Any):
-        options = {"subprotocols": [PROTOCOL], "compression": None, "max_size": None, "close_timeout": 5.0, **options}
+        options = {
+            "subprotocols": [PROTOCOL],
+            "compression": None,
+            "max_size": None,
+            "close_timeout": 5.0,
+            "open_timeout": 60.0,
+            **options,
+        }
         async with websockets.connect(f"ws://{self._address}/v1/stream", **options) as socket:
             yield socket
 

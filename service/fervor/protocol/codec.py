@@ -136,9 +136,9 @@ def _refusal(error: ValidationError, message: object) -> MessageError:
     if not isinstance(message, dict) or message.get("type") != "frame":
         return MessageError(sentence)
     body, seq = message.get("body", "0"), message.get("seq")
-    if not isinstance(body, str) or type(seq) is not int:
+    if not isinstance(body, str) or not 1 <= len(body) <= 64 or type(seq) is not int or not 0 <= seq <= 2**53:
         return MessageError(sentence)
-    return FrameError(f"frame {seq} of body {body[:64]!r}: {sentence}", body=body[:64], seq=seq)
+    return FrameError(f"frame {seq} of body {body!r}: {sentence}", body=body, seq=seq)
 
 
 def _place(loc: tuple[int | str, ...]) -> str:

@@ -78,7 +78,7 @@ class Session:
         self._outcomes: dict[Ticket, Outcome | EngineError] = {}  # that wait for those of earlier tickets
         self._groups = Groups()
         self._calibrating: Calibrating | None = None
-        self._calibrated: dict[Ticket, SessionCalibrated] = {}  # told after the estimate of the last frame under way
+        self._calibrated: dict[Ticket, int] = {}  # last frame of a calibration → the group that tells of it
         self._totals = Totals().model_dump()
 
     @property
@@ -240,12 +240,13 @@ class Session:
 
     def _follow(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> list[Event]:
         """What comes after a ticket's estimate: its checkpoint, and a calibration that ended with it."""
-        followers = [self._checkpoint(ticket, body, outcome), self._calibrated.pop(ticket, None)]
+        checkpoint = self._checkpoint(ticket, body, outcome)
         if ticket.group is None:
-            return [Reply(message) for message in followers if message is not None]
-        for message in followers:
-            if message is not None:
-                self._groups.follow(ticket.group, message)
+            told: list[Event] = [Reply(checkpoint)] if checkpoint else []
+            group = self._calibrated.pop(ticket, None)
+            return told if group is None else told + self._close_group(group)
+        if checkpoint:
+            self._groups.follow(ticket.group, checkpoint)
         return self._close_group(ticket.group)
 
     def _checkpoint(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> Checkpoint | None:
@@ -332,13 +333,21 @@ class Session:
         self._agreement = self._agreed.aligned(found.skeleton)
         for known in self._roster:
             known.adopt(self._agreement.terms)
-        self._calibrated[ticket] = SessionCalibrated(
+        message = SessionCalibrated(
             skeleton=SkeletonSpec.of(found.skeleton, name=name),
             frames=found.frames,
             spread_deg=found.spread_deg,
             unseen=found.unseen,
         )
-        return self.checkpoints(ticket.group)  # those before are of terms that no longer hold
+        return self._tell_calibrated(ticket, message)
+
+    def _tell_calibrated(self, ticket: Ticket, message: SessionCalibrated) -> list[Event]:
+        """Once its last frame is answered, in one go with checkpoints under the new terms: the old ones are void."""
+        group = self._groups.open() if ticket.group is None else ticket.group
+        if ticket.group is None:
+            self._calibrated[ticket] = group
+        self._groups.follow(group, message)
+        return self.checkpoints(group)
 
     def _let_go(self, body: str) -> list[Event]:
         """A body is gone, and with it the calibration that its pose was held for; one that waits for it goes on to."""
