@@ -56,3 +56,8 @@ def test_times_come_from_the_frame_or_from_the_rate():
     assert agreed(clock="frames", nominal_hz=10).time_of(Frame(seq=9, q=())) == pytest.approx(0.9)
     with pytest.raises(FrameError, match="frame 9 of body '0' has no t"):
         agreed().time_of(Frame(seq=9, q=()))
+
+
+def test_an_empty_list_of_joints_is_refused():
+    with pytest.raises(InputError, match="joints is empty"):
+        agree(SessionStart(joints=()), model().metadata)

@@ -143,6 +143,8 @@ def _known(asked: str | SkeletonSpec, skeletons: Mapping[str, Skeleton]) -> Skel
 def _places(sent: tuple[str, ...] | None, known: tuple[str, ...], name: str) -> npt.NDArray[np.intp] | None:
     if sent is None or sent == known:
         return None
+    if not sent:
+        raise InputError("joints is empty; expected the names of those that are sent, or no joints at all")
     place = {joint: index for index, joint in enumerate(known)}
     unknown = [joint for joint in sent if joint not in place]
     if unknown:
