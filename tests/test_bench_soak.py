@@ -35,7 +35,7 @@ def test_each_leak_is_told():
 
 
 def test_noise_of_a_short_run_is_no_complaint():
-    assert swellings(samples(slope=9.0, seconds=40)) == []
+    assert swellings(samples(slope=9.0, seconds=30)) == []
 
 
 @pytest.mark.slow
