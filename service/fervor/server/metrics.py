@@ -15,8 +15,10 @@ from prometheus_client.registry import Collector
 from fervor import __version__
 from fervor.engine.batcher import Batcher, Run
 from fervor.model import Model
+from fervor.server.board import Board
 from fervor.server.connections import Connections
 from fervor.server.draining import Drain
+from fervor.server.gathered import Gathered
 from fervor.server.scoring_process import ScoringProcess
 
 LAG_EVERY_S = 0.5
@@ -65,8 +67,19 @@ class Metrics:
         by_reason = ("reason",)
         self._refused = Counter("fervor_sessions_refused", "sessions not let in", by_reason, registry=registry)
         self._ended = Counter("fervor_sessions_ended", "sessions that are over", by_reason, registry=registry)
+        self._gathered: Gathered | None = None
         batcher.watch(self._note_run)
         scoring.watch(self._score.observe)
+
+    @property
+    def shown(self) -> Collector:
+        """What `/metrics` shows: with several workers, those of all."""
+        return self._gathered or self.registry
+
+    def gather(self, board: Board, place: int) -> None:
+        """Share these metrics with the other workers."""
+        self._gathered = Gathered(self.registry, board, place)
+        self._gathered.show()
 
     def note_refusal(self, reason: str) -> None:
         """A session was not let in."""
@@ -77,12 +90,14 @@ class Metrics:
         self._ended.labels(reason).inc()
 
     async def watch_loop(self) -> None:
-        """Look at the event loop's lag, for ever."""
+        """Look at the event loop's lag, and tell the other workers how things stand, for ever."""
         loop = asyncio.get_running_loop()
         while True:
             due = loop.time() + LAG_EVERY_S
             await asyncio.sleep(LAG_EVERY_S)
             self._lag.observe(max(loop.time() - due, 0.0))
+            if self._gathered is not None:
+                self._gathered.show()
 
     def _note_run(self, run: Run) -> None:
         self._size.observe(run.size)

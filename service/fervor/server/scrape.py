@@ -14,5 +14,5 @@ router = APIRouter(tags=["metrics"])
 
 @router.get("/metrics", response_class=Response)
 async def metrics(service: Annotated[Service, Depends(service_of)]) -> Response:
-    """All metrics of this process."""
-    return Response(generate_latest(service.metrics.registry), media_type=CONTENT_TYPE_PLAIN_0_0_4)
+    """All metrics of this service."""
+    return Response(generate_latest(service.metrics.shown), media_type=CONTENT_TYPE_PLAIN_0_0_4)
