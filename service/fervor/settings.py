@@ -47,6 +47,7 @@ class Settings(BaseSettings):
 
     host: str = Field("127.0.0.1", description="address to listen on; 0.0.0.0 for all")
     port: int = Field(8080, ge=0, le=65535, description="port to listen on; 0 takes a free one and says which")
+    workers: int = Field(1, ge=1, le=256, description="processes that serve the address; each has the limits below")
     log_level: LogLevel = Field("info", description="least severity that is logged")
     log_format: LogFormat = Field(
         "text", description="`text`: lines for people; `json`: one object a line, for programs"

@@ -1,18 +1,23 @@
 """Runs the service under uvicorn, set up for live streams (measured: docs, "Performance").
 
-One process, one event loop (uvloop), no compression, no Nagle delay. SIGTERM and SIGINT stop it gently: it is no
+A process has one event loop (uvloop), no compression, no Nagle delay. SIGTERM and SIGINT stop it gently: it is no
 longer ready, streams get their last checkpoints and 1012, and what else is under way has `shutdown_grace_s` to end.
+With more than one worker, a supervisor runs that many such processes on the same address.
 """
 
 import logging
 import resource
+import signal
 import socket
+import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 
 import uvicorn
 
 from fervor.errors import FervorError
 from fervor.server.app import create_app
+from fervor.server.board import Board
 from fervor.server.http_protocol import GuardedHttp
 from fervor.server.logs import configure_logs
 from fervor.server.service import Service
@@ -35,18 +40,46 @@ class AddressError(FervorError):
     exit_code = 69
 
 
+def say_where(bound: socket.socket) -> None:
+    """Log the address of a service that listens."""
+    host, port, *_ = bound.getsockname()
+    log.info("listening on http://%s:%d", f"[{host}]" if ":" in host else host, port)
+
+
 class Server(uvicorn.Server):
-    """uvicorn, that says where it listens once it does."""
+    """uvicorn, that tells when it listens, and sends streams away in good order.
+
+    Args:
+        config: from `configure`.
+        on_listening: told each socket once connections to it are taken.
+        board: where other workers listen on the same sockets.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        *,
+        on_listening: Callable[[socket.socket], None] = say_where,
+        board: Board | None = None,
+    ) -> None:
+        super().__init__(config)
+        self._on_listening = on_listening
+        self._board = board
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen."""
         await super().startup(sockets)
         for bound in sockets or []:
-            host, port, *_ = bound.getsockname()
-            log.info("listening on http://%s:%d", f"[{host}]" if ":" in host else host, port)
+            self._on_listening(bound)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Send the streams away with their last checkpoints, then stop."""
+        """Send the streams away with their last checkpoints, then stop.
+
+        New clients are told to come later (503), but where other workers stay: there they go to those at once.
+        """
+        if self._board is not None and not self._board.stopping:
+            for server in self.servers:
+                server.close()
         service: Service = self.config.app.state.service  # type: ignore[union-attr]  # create_app put it there
         if not await service.drain.run(service.settings.drain_s):
             log.warning("not every client took its last checkpoint within %g s", service.settings.drain_s)
@@ -61,8 +94,22 @@ def run(settings: Settings) -> None:
     """
     configure_logs(settings.log_format, settings.log_level)
     allow_files(settings.max_connections)
+    end_well()
     with bind(settings.host, settings.port) as bound:
-        Server(configure(settings)).run(sockets=[bound])
+        if settings.workers == 1:
+            Server(configure(settings)).run(sockets=[bound])
+        else:
+            from fervor.server.supervisor import Supervisor
+
+            Supervisor(settings, bound, on_serving=say_where).run()
+
+
+def end_well() -> None:
+    """Have SIGTERM end this process with exit code 0: to stop when told to is no failure.
+
+    uvicorn takes the signal while it runs, and raises it again once all is done.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
 
 
 def configure(settings: Settings) -> uvicorn.Config:
