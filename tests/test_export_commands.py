@@ -87,6 +87,16 @@ def test_export_of_a_checkpoint(run, tmp_path):
     assert mine.metadata.training == first.metadata.training
 
 
+def test_export_to_a_repository_of_triton(run, tmp_path):
+    out, repository = tmp_path / "mine.onnx", tmp_path / "repository"
+    options = ("--out", str(out), "--name", "mine", "--triton", str(repository))
+    result = invoke("export", str(run[0] / "checkpoint.pt"), *options)
+    assert f"{repository / 'mine' / '1'}: a version for Triton" in result.output
+    assert (repository / "mine" / "1" / "model.onnx").read_bytes() == out.read_bytes()
+    result = invoke("export", str(out), "--triton", str(repository))
+    assert result.output == f"{repository / 'mine' / '1'}: a version for Triton\n"
+
+
 def test_a_refused_model_file_costs_no_training(tmp_path, monkeypatch):
     def refuse(*_):
         raise ModelFileError("refused")

@@ -48,8 +48,8 @@ def train(  # noqa: PLR0917  # typer calls it by name
     )
 
 
-def export(
-    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a run.")],
+def export(  # noqa: PLR0917  # typer calls it by name
+    checkpoint: Annotated[Path, typer.Argument(help="checkpoint.pt of a run; with --triton, a model file too.")],
     out: Annotated[Path, typer.Option(help="Model file to write.")] = Path("model.onnx"),
     name: Annotated[str, typer.Option(help="What the service will call it.")] = "fervor-demo",
     version: Annotated[str, typer.Option(help="Of the model, as you count.")] = "0.1.0",
@@ -57,8 +57,12 @@ def export(
         Literal["demo", "research"] | None,
         typer.Option(help="Shown wherever the model shows.", show_default="the checkpoint's"),
     ] = None,
+    triton: Annotated[Path | None, typer.Option(help="Add it to this model repository of Triton too.")] = None,
 ) -> None:
     """Write the model file of a checkpoint, checked against the network it comes from."""
+    if triton is not None and checkpoint.suffix == ".onnx":
+        _add_to_repository(checkpoint, triton)
+        return
     from fervor_export.checkpoint import load_checkpoint
     from fervor_export.export import describe, export_model
 
@@ -66,6 +70,14 @@ def export(
     metadata = describe(trained, name=name, version=version, purpose=purpose or trained.purpose)
     report = export_model(trained.network, metadata, out)
     typer.echo(f"{out}: {name} {version}, largest difference to the network {report.largest:.1e} ({report.where})")
+    if triton is not None:
+        _add_to_repository(out, triton)
+
+
+def _add_to_repository(model_file: Path, repository: Path) -> None:
+    from fervor_export.triton import write_repository
+
+    typer.echo(f"{write_repository(model_file, repository)}: a version for Triton")
 
 
 def _train_visibly(
