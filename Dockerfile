@@ -4,9 +4,8 @@ ARG PYTHON=python:3.11-slim
 
 FROM ${PYTHON} AS build
 WORKDIR /src
-RUN python -m venv /opt/fervor
-COPY constraints.txt .
-COPY pyproject.toml README.md LICENSE ./
+RUN python -m venv --without-pip /opt/fervor
+COPY constraints.txt pyproject.toml README.md LICENSE ./
 COPY service service
 COPY export export
 COPY clients/python clients/python
@@ -14,14 +13,21 @@ COPY bench/fervor_bench bench/fervor_bench
 RUN /opt/fervor/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt '.[serve]' \
  && find /opt/fervor -depth \( -name __pycache__ -o -name tests -o -name test \) -type d -exec rm -rf {} + \
  && rm -rf /opt/fervor/lib/python3*/site-packages/pip /opt/fervor/lib/python3*/site-packages/setuptools
+RUN python -m pip --python /opt/fervor/bin/python install --no-cache-dir --no-compile --disable-pip-version-check \
+      --constraint constraints.txt '.[serve]' \
+ && find /opt/fervor -depth \( -name tests -o -name test \) -type d -exec rm -rf {} +
 
 FROM ${PYTHON}
+LABEL org.opencontainers.image.title="fervor" \
+      org.opencontainers.image.description="Live emotional intensity from body poses, for robots" \
+      org.opencontainers.image.licenses="Apache-2.0"
 COPY --from=build /opt/fervor /opt/fervor
-ENV PATH=/opt/fervor/bin:$PATH PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 ORT_DISABLE_TELEMETRY=1 FERVOR_HOST=0.0.0.0
+ENV PATH=/opt/fervor/bin:$PATH PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 ORT_DISABLE_TELEMETRY=1 \
+    FERVOR_HOST=0.0.0.0 FERVOR_PORT=8080
 USER 65532:65532
 EXPOSE 8080
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=5s --timeout=3s --start-period=10s \
-  CMD ["python", "-c", "import urllib.request as r; r.urlopen('http://127.0.0.1:8080/readyz', timeout=2)"]
+  CMD ["python", "-c", "import os, urllib.request as r; r.urlopen(f'http://127.0.0.1:{os.environ[\"FERVOR_PORT\"]}/readyz', timeout=2)"]
 ENTRYPOINT ["fervor"]
 CMD ["serve"]

@@ -1,0 +1,216 @@
+"""The image and compose.yaml, for real: what runs in the container, and what a stream notices of its end: nothing."""
+
+import json
+import re
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets import ConnectionClosed
+from websockets.sync.client import connect
+
+from bodies import motion
+from containers import NEEDED, PYTHON_IMAGE, Compose, Docker, make_images, need, roomy_folder, running_docker, which
+from fervor.cli.local import free_port
+from fervor.settings import MIB
+from live import PROTOCOL, Live, frames_of
+from pages import ROOT
+from program import write_bvh
+from robots import Robots, assert_told_as_if_nothing_had_happened
+
+MOST_MB = 200
+"""Megabytes that the service may add to its base image."""
+
+FEW_ROBOTS = 4
+
+
+@pytest.fixture(scope="module")
+def docker() -> Iterator[Docker]:
+    """A daemon with all images but Grafana's."""
+    need(*NEEDED)
+    with roomy_folder() as folder, running_docker(folder) as docker:
+        make_images(docker, folder)
+        yield docker
+
+
+def until(look: Callable[[], Any], seconds: float = 60.0) -> Any:
+    deadline = time.monotonic() + seconds
+    while not (seen := look()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return seen
+
+
+def sessions(docker: Docker, container: str) -> int:
+    """How many a service has."""
+    text = httpx.get(f"http://{docker.address(container)}:8080/metrics", timeout=30).text
+    return round(float(re.findall(r"^fervor_sessions (\S+)", text, re.MULTILINE)[0]))
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_dockerfile_has_no_lint() -> None:
+    need("hadolint")
+    done = subprocess.run([str(which("hadolint")), "Dockerfile"], cwd=ROOT, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_compose_starts_the_service_alone_unless_asked_for_more() -> None:
+    need("docker-compose")
+
+    def services(*profiles: str) -> set[str]:
+        chosen = [word for profile in profiles for word in ("--profile", profile)]
+        command = [str(which("docker-compose")), *chosen, "config", "--services"]
+        return set(subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split())
+
+    assert services() == {"fervor"}
+    assert services("replicas") == {"fervor", "replica", "haproxy"}
+    assert services("watch") == {"fervor", "prometheus", "grafana"}
+
+
+# --- the image --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_image_is_small_and_without_torch(docker: Docker) -> None:
+    added = (docker.inspect("fervor")["Size"] - docker.inspect(PYTHON_IMAGE)["Size"]) / 1e6
+    print(f"the service adds {added:.0f} MB to {PYTHON_IMAGE}")
+    assert added < MOST_MB
+    search = "from importlib.util import find_spec as f; print([m for m in ('torch', 'onnx', 'pip', 'pytest') if f(m)])"
+    path = "/opt/fervor/bin/python"
+    assert docker("run", "--rm", "--entrypoint", path, "fervor", "-I", "-c", search) == "[]"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_container_may_do_nothing_but_serve(docker: Docker, tmp_path: Path) -> None:
+    with Compose(docker, "alone", FERVOR_PUBLISH=f"127.0.0.1:{free_port()}").up() as compose:
+        (container,) = compose.containers("fervor")
+        assert docker.inspect(container)["State"]["Health"]["Status"] == "healthy"
+        for status in docker(
+            "exec", container, "sh", "-c", "for p in /proc/[1-9]*; do cat $p/status; echo ==; done"
+        ).split("==")[:-1]:
+            said = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
+            assert set(said["Uid"].split()) == {"65532"}
+            assert {said[name] for name in ("CapEff", "CapPrm", "CapBnd")} == {"0" * 16}
+            assert said["NoNewPrivs"] == "1"
+        assert "Read-only file system" in docker("exec", container, "sh", "-c", "touch /x 2>&1 || true")
+        large = write_bvh(tmp_path / "large.bvh", seconds=60.0)
+        assert large.stat().st_size > MIB  # above which an upload is put into a file
+        url = f"http://{docker.address(container)}:8080/v1/score/file"
+        answer = httpx.post(url, files={"file": large.open("rb")}, timeout=120)
+        assert answer.status_code == 200, answer.text
+        assert docker("exec", container, "find", "/tmp", "-type", "f") == ""
+        assert docker("exec", container, "stat", "--file-system", "--format", "%T", "/tmp") == "tmpfs"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("workers", [1, 2])
+def test_sigterm_gives_last_checkpoints_and_ends_with_0(docker: Docker, workers: int) -> None:
+    container = docker(
+        "run", "--detach", "--read-only", "--cap-drop", "ALL", "-e", f"FERVOR_WORKERS={workers}", "fervor"
+    )
+    docker.wait_healthy(container)
+    (frame,) = frames_of(motion(1))
+    with connect(f"ws://{docker.address(container)}:8080/v1/stream", subprotocols=[PROTOCOL]) as socket:
+        for message in ({"type": "session.start", "checkpoint_s": 60.0}, {"type": "frame", "body": "eve", **frame}):
+            socket.send(json.dumps(message))
+            socket.recv()
+        docker("stop", "--time", "20", container)
+        assert [json.loads(socket.recv())["type"] for _ in range(2)] == ["going_away", "checkpoint"]
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1012
+    assert docker.inspect(container)["State"]["ExitCode"] == 0
+    assert "Traceback" not in docker.logs(container)
+
+
+# --- replicas ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def replicas(docker: Docker) -> Iterator[tuple[Compose, str]]:
+    """Two replicas behind haproxy, and the address of both."""
+    port = free_port()
+    variables = {"FERVOR_PUBLISH": f"127.0.0.1:{free_port()}", "FERVOR_PUBLISH_REPLICAS": f"127.0.0.1:{port}"}
+    with Compose(docker, "replicas", "replicas", **variables).up() as compose:
+        url = f"http://127.0.0.1:{port}"
+        until(lambda: ready(url))
+        yield compose, f"ws://127.0.0.1:{port}"
+
+
+def ready(url: str) -> bool:
+    try:
+        return httpx.get(f"{url}/readyz", timeout=30).status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_robots_are_spread_and_killed_containers_cost_them_nothing(
+    docker: Docker, replicas: tuple[Compose, str], live: Live
+) -> None:
+    compose, url = replicas
+    both = compose.containers("replica")
+    assert len(both) == 2
+    with Robots(url, FEW_ROBOTS) as robots:
+        assert [sessions(docker, container) for container in both] == [FEW_ROBOTS / 2] * 2
+        for container in both:  # each robot is with one of them
+            docker("kill", "--signal", "KILL", container)
+            robots.settle()
+            docker("start", container)
+            docker.wait_healthy(container)
+            robots.settle()
+    assert all(robots.reconnects)
+    assert_told_as_if_nothing_had_happened(robots, live.stream)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_a_rolling_restart_of_all_replicas_costs_robots_nothing(
+    docker: Docker, replicas: tuple[Compose, str], live: Live
+) -> None:
+    compose, url = replicas
+    with Robots(url, FEW_ROBOTS) as robots:
+        for container in compose.containers("replica"):
+            docker("restart", "--time", "20", container)
+            docker.wait_healthy(container)
+            robots.settle()
+    assert all(robots.reconnects)
+    assert_told_as_if_nothing_had_happened(robots, live.stream)
+
+
+# --- watching ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_prometheus_finds_the_service_and_reads_its_metrics(docker: Docker) -> None:
+    variables = {"FERVOR_PUBLISH": f"127.0.0.1:{free_port()}"}
+    with Compose(docker, "watch", "watch", **variables).up("fervor", "prometheus") as compose:
+        (container,) = compose.containers("prometheus")
+        checked = docker("exec", container, "promtool", "check", "config", "/etc/prometheus/prometheus.yml")
+        assert "SUCCESS" in checked
+        api = f"http://{docker.address(container)}:9090/api/v1/query"
+
+        def asked() -> list[dict[str, Any]]:
+            try:
+                found: list[dict[str, Any]] = httpx.get(api, params={"query": "fervor_bodies_capacity"}).json()["data"][
+                    "result"
+                ]
+            except httpx.TransportError:
+                return []
+            return found
+
+        (metric,) = until(asked)
+        assert metric["metric"]["job"] == "fervor"
+        assert float(metric["value"][1]) > 0
