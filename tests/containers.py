@@ -12,7 +12,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +21,7 @@ from typing import Any
 import pytest
 
 from pages import ROOT
+from waiting import until
 
 PYTHON_IMAGE = "python:3.11-slim"
 
@@ -115,10 +115,7 @@ class Docker:
 
     def wait_healthy(self, container: str) -> None:
         """Wait until its health check passes."""
-        deadline = time.monotonic() + 60
-        while self.inspect(container)["State"]["Health"]["Status"] != "healthy":
-            assert time.monotonic() < deadline, self.logs(container)
-            time.sleep(0.1)
+        until(lambda: self.inspect(container)["State"]["Health"]["Status"] == "healthy")
 
 
 @contextmanager
@@ -132,11 +129,8 @@ def running_docker(home: Path) -> Iterator[Docker]:
             stdin=subprocess.DEVNULL, stdout=log, stderr=log,
         )  # fmt: skip
     try:
-        deadline = time.monotonic() + 60
-        while not docker("version", "--format", "{{.Server.Version}}", check=False):
-            alive = process.poll() is None and time.monotonic() < deadline
-            assert alive, (home / "log").read_text()[-2000:]
-            time.sleep(0.1)
+        until(lambda: process.poll() is not None or docker("version", "--format", "{{.Server.Version}}", check=False))
+        assert process.poll() is None, (home / "log").read_text(encoding="utf-8")[-2000:]
         yield docker
     finally:
         if ids := docker("ps", "--all", "--quiet", check=False).split():

@@ -3,8 +3,7 @@
 import json
 import re
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from live import PROTOCOL, Live, frames_of
 from pages import ROOT
 from program import write_bvh
 from robots import Robots, assert_told_as_if_nothing_had_happened
+from waiting import until
 
 MOST_MB = 200
 """Megabytes that the service may add to its base image."""
@@ -36,14 +36,6 @@ def docker() -> Iterator[Docker]:
     with roomy_folder() as folder, running_docker(folder) as docker:
         make_images(docker, folder)
         yield docker
-
-
-def until(look: Callable[[], Any], seconds: float = 60.0) -> Any:
-    deadline = time.monotonic() + seconds
-    while not (seen := look()):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    return seen
 
 
 def sessions(docker: Docker, container: str) -> int:
@@ -166,6 +158,7 @@ def test_robots_are_spread_and_killed_containers_cost_them_nothing(
     compose, url = replicas
     both = compose.containers("replica")
     assert len(both) == 2
+    assert httpx.get(f"{url.replace('ws', 'http', 1)}/metrics").status_code == 404, "metrics are for the inside"
     with Robots(url, FEW_ROBOTS) as robots:
         assert [sessions(docker, container) for container in both] == [FEW_ROBOTS / 2] * 2
         for container in both:  # each robot is with one of them

@@ -2,6 +2,7 @@
 
 import os
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -36,6 +37,18 @@ def test_what_is_too_large_changes_nothing() -> None:
     board.show(0, b"fits")
     board.show(0, bytes(HALF_BYTES))
     assert board.read(0) == b"fits"
+
+
+def test_a_place_ages_until_something_is_shown_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 1000.0
+    monkeypatch.setattr("fervor.server.board.monotonic", lambda: now)
+    board = Board(2)
+    board.show(1, b"one")
+    now = 1004.0
+    assert board.age(1) == 4.0
+    board.show(1, bytes(HALF_BYTES))  # too large to be shown, but a sign of life
+    assert (board.age(1), board.read(1)) == (0.0, b"one")
+    assert board.age(0) == now
 
 
 def test_a_forked_process_sees_and_is_seen() -> None:

@@ -8,12 +8,14 @@ then one byte, written at once, turns to it. Memory without a name or a file: a 
 import mmap
 import struct
 import zlib
+from time import monotonic
 
 HALF_BYTES = 1 << 20
 """Most that a worker can show; pages that were never written take no memory."""
 
+_STAMP = struct.Struct("!d")  # when it was last written, monotonic seconds, which all processes of a machine share
 _HEAD = struct.Struct("!II")  # length, checksum
-_PLACE_BYTES = 1 + 2 * HALF_BYTES
+_PLACE_BYTES = _STAMP.size + 1 + 2 * HALF_BYTES
 _NOTHING, _FIRST, _SECOND = 0, 1, 2
 
 
@@ -35,9 +37,10 @@ class Board:
 
     def show(self, place: int, content: bytes) -> None:
         """Put up what stands at a place from now on; what is too large is not put up."""
+        start = self._start(place)
+        self._memory[start - _STAMP.size : start] = _STAMP.pack(monotonic())
         if len(content) > HALF_BYTES - _HEAD.size:
             return
-        start = self._start(place)
         turn = _SECOND if self._memory[start] == _FIRST else _FIRST
         half = self._half(place, turn)
         self._memory[half : half + _HEAD.size] = _HEAD.pack(len(content), zlib.crc32(content))
@@ -55,13 +58,20 @@ class Board:
         # Two writes while this one read took place would show; nobody writes so often, so this is for a broken writer.
         return content if zlib.crc32(content) == checksum else None
 
+    def age(self, place: int) -> float:
+        """Seconds since something was last shown at a place."""
+        start = self._start(place)
+        (stamp,) = _STAMP.unpack(self._memory[start - _STAMP.size : start])
+        return monotonic() - float(stamp)
+
     def clear(self, place: int) -> None:
         """Nobody stands at a place any more."""
         self._memory[self._start(place)] = _NOTHING
 
     def _start(self, place: int) -> int:
+        """Where the byte is that says which half is shown; the stamp stands before it."""
         assert 0 <= place < self.places
-        return 1 + place * _PLACE_BYTES
+        return 1 + place * _PLACE_BYTES + _STAMP.size
 
     def _half(self, place: int, turn: int) -> int:
         return self._start(place) + 1 + (turn - 1) * HALF_BYTES

@@ -2,7 +2,8 @@
 
 Rules.
 - The first worker starts alone: what is wrong with settings or model is said once, and ends the start.
-- A worker that ends unasked is replaced at once; one that could not even start is tried again after `RETRY_S`.
+- A worker that ends unasked is replaced at once; one that could not even start is tried again after `RETRY_S`. One
+  whose event loop has not turned for `STUCK_S` is killed: its clients are better off on another.
 - SIGTERM and SIGINT stop all workers at the same time; a second SIGINT does not wait for them. SIGHUP replaces the
   workers one after another, each by one that serves already: no moment without a worker, no stream lost.
 - Workers are forked from this process, which holds no model and runs no thread: what it has loaded, they share.
@@ -35,6 +36,12 @@ log = logging.getLogger(__name__)
 
 RETRY_S = 1.0
 """Pause before a worker that could not start is tried again."""
+
+STUCK_S = 10.0
+"""Silence after which a worker counts as stuck; each shows its metrics twice a second."""
+
+LOOK_S = 2.0
+"""How often the supervisor looks for stuck workers."""
 
 FAULT = 70
 """Exit code where the first worker was killed before it served (EX_SOFTWARE)."""
@@ -69,6 +76,7 @@ class Supervisor:
         self._replaced: Member | None = None
         self._retry_at: float | None = None
         self._stopped_by: int | None = None
+        self._looked = monotonic()
         self._board = Board(settings.workers + 1)  # one more: while a worker is replaced there are two
         self._life, self._hold = os.pipe()
 
@@ -92,7 +100,7 @@ class Supervisor:
         """Wait until something happens, and note it."""
         ready = [member.ready for member in self._members if not member.serves]
         ends = [member.process.sentinel for member in self._members]
-        pause = None if self._retry_at is None else max(self._retry_at - monotonic(), 0.0)
+        pause = LOOK_S if self._retry_at is None else min(max(self._retry_at - monotonic(), 0.0), LOOK_S)
         happened = wait([heard, *ready, *ends], pause)
         if heard in happened:
             for number in heard.recv(4096):
@@ -102,8 +110,19 @@ class Supervisor:
                 self._note_ready(member)
             if member.process.sentinel in happened:
                 self._note_end(member)
+        self._look()
 
     # --- what happens ---
+
+    def _look(self) -> None:
+        """Kill who is stuck."""
+        since, self._looked = monotonic() - self._looked, monotonic()
+        if since > 2 * LOOK_S:  # this process was not let run either: the machine slept, or all are short of time
+            return
+        for member in self._staying():
+            if member.serves and self._board.age(member.place) > STUCK_S:
+                log.error("worker %d (process %d) is stuck; killing it", member.place, member.process.pid)
+                member.process.kill()
 
     def _note_signal(self, number: int) -> None:
         if number == signal.SIGHUP:
