@@ -97,7 +97,7 @@ def test_the_container_may_do_nothing_but_serve(docker: Docker, tmp_path: Path) 
         large = write_bvh(tmp_path / "large.bvh", seconds=60.0)
         assert large.stat().st_size > MIB  # above which an upload is put into a file
         url = f"http://{docker.address(container)}:8080/v1/score/file"
-        answer = httpx.post(url, files={"file": large.open("rb")}, timeout=120)
+        answer = httpx.post(url, files={"file": (large.name, large.read_bytes())}, timeout=120)
         assert answer.status_code == 200, answer.text
         assert docker("exec", container, "find", "/tmp", "-type", "f") == ""
         assert docker("exec", container, "stat", "--file-system", "--format", "%T", "/tmp") == "tmpfs"
