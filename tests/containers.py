@@ -53,6 +53,12 @@ def need(*programs: str) -> None:
             _do_without(program)
 
 
+def need_root() -> None:
+    """Skip where a daemon can't be started; in CI, fail."""
+    if os.geteuid() != 0:
+        _do_without("root's right to start a Docker daemon", how="these tests run as root")
+
+
 def need_module(name: str) -> ModuleType:
     """Import what the extra `deploy` brings; skip where it is missing, but in CI."""
     try:
@@ -62,8 +68,8 @@ def need_module(name: str) -> ModuleType:
         raise
 
 
-def _do_without(name: str) -> None:
-    sentence = f"{name} is not installed; .ci/install installs what these tests need"
+def _do_without(name: str, *, how: str = ".ci/install installs what these tests need") -> None:
+    sentence = f"{name} is not there; {how}"
     if os.environ.get("CI"):
         pytest.fail(sentence)
     pytest.skip(sentence)

@@ -121,7 +121,7 @@ def _serve(port: int) -> None:
     """What runs in the service's process."""
     from fervor.server.run import run
 
-    settings = Settings.load(host=HOST, port=port, log_level="warning", shutdown_grace_s=1)
+    settings = Settings.load(host=HOST, port=port, workers=1, log_level="warning", shutdown_grace_s=1)
     threading.Thread(target=_end_with_starter, daemon=True).start()
     try:
         run(settings)
