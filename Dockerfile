@@ -10,10 +10,6 @@ COPY service service
 COPY export export
 COPY clients/python clients/python
 COPY bench/fervor_bench bench/fervor_bench
-RUN /opt/fervor/bin/pip install --no-cache-dir --disable-pip-version-check --constraint constraints.txt '.[serve]' \
- && find /opt/fervor -depth \( -name __pycache__ -o -name tests -o -name test \) -type d -exec rm -rf {} + \
- && rm -rf /opt/fervor/lib/python3*/site-packages/pip /opt/fervor/lib/python3*/site-packages/setuptools
-RUN python -m pip --python /opt/fervor/bin/python install --no-cache-dir --no-compile --disable-pip-version-check \
 # Compiled here once: the container can't write, and a replica that comes back should not spend its start on it.
 RUN python -m pip --python /opt/fervor/bin/python install --no-cache-dir --disable-pip-version-check \
       --constraint constraints.txt '.[serve]' \

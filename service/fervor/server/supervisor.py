@@ -212,7 +212,7 @@ class Supervisor:
 
 def with_key(settings: Settings) -> Settings:
     """Settings whose workers believe each other's checkpoints; a key is made up where there is none."""
-    if settings.checkpoint_keys:
+    if settings.checkpoint_keys or settings.checkpoint_keys_file:
         return settings
     log.info("no FERVOR_CHECKPOINT_KEYS: streams survive the end of a worker, but not a restart of this service")
     return settings.model_copy(update={"checkpoint_keys": (SecretStr(secrets.token_hex(32)),)})
