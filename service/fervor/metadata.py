@@ -45,6 +45,7 @@ class LevelRule(BaseModel):
     threshold: dict[str, float] = Field(description="per emotion, and `unknown`; intensity from here on is strong")
     hysteresis: float = Field(0.05, ge=0, lt=0.5, description="half-width of the band in which the level stays")
     dwell_s: float = Field(1.0, ge=0, description="least time a level is kept before it may change")
+    source: str = Field("", description="whose predictions the thresholds were chosen by")
 
     @model_validator(mode="after")
     def _covers_all(self) -> "LevelRule":
