@@ -255,3 +255,15 @@ def write_manifest(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """A manifest of rows that may have different columns."""
     columns = dict.fromkeys(column for row in rows for column in row)
     return write_table(folder / "manifest.csv", [{column: row.get(column, "") for column in columns} for row in rows])
+
+
+def write_rated(folder: Path, *, count: int = 24, actors: int = 3, emotions: Sequence[str] = ("joy", "anger")) -> Path:
+    """A small manifest of the rig's own rotations, with votes; every actor shows every emotion."""
+    rows = []
+    for index in range(count):
+        votes, emotion = (5 * index) % (OBSERVERS + 1), emotions[index % len(emotions)]
+        name = f"take{index}.npz"
+        write_npz(folder / name, motion(emotion, share=votes / OBSERVERS, seed=index, rate_hz=60.0))
+        actor = f"actor {index // len(emotions) % actors}"
+        rows.append({"file": name, "emotion": emotion, "votes": f"{votes}/{OBSERVERS}", "actor": actor})
+    return write_manifest(folder, rows)

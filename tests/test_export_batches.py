@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fervor_export.batches import LEGS, OBSERVERS, pad, plain_stream, training_batches
+from fervor_export.batches import (
+    LEGS,
+    OBSERVERS,
+    arrange,
+    batches_an_epoch,
+    cut,
+    pad,
+    plain_stream,
+    training_batches,
+)
 from fervor_export.recipe import DEFAULT, PAPER, RECIPES, Recipe
 from networks import waving_clips
 
@@ -18,8 +27,8 @@ def clips():
     return waving_clips(30)
 
 
-def epoch(clips, recipe: Recipe, seed: int = 0):
-    return list(training_batches(clips, recipe, np.random.default_rng(seed)))
+def epoch(clips, recipe: Recipe, seed: int = 0, number: int = 1):
+    return list(training_batches(clips, recipe, seed=seed, epoch=number))
 
 
 def test_weights_say_where_something_is_expected(clips):
@@ -61,9 +70,39 @@ def test_batches_are_of_similar_length(clips):
     assert padded < 1.15 * sum(clip.frames for clip in many)
 
 
+@pytest.mark.parametrize(("count", "size"), [(300, 256), (12_000, 256), (513, 64), (7, 64), (2049, 256)])
+def test_no_length_counts_for_more_than_another(count, size):
+    """The mean over an epoch's batches of the mean in each is nearly the mean over clips, whatever their length."""
+    lengths = np.sort(np.random.default_rng(0).integers(40, 400, count)).tolist()
+    batches = arrange(lengths, size, seed=0, epoch=3)
+    assert sorted(np.concatenate(batches).tolist()) == list(range(count))
+    assert len(batches) == batches_an_epoch(count, size)
+    sizes = [len(batch) for batch in batches]
+    assert max(sizes) <= size
+    assert max(sizes) - min(sizes) <= 1
+    share = np.zeros(count)
+    for batch in batches:
+        share[batch] = 1 / (len(batch) * len(batches))
+    assert np.average(lengths, weights=share) == pytest.approx(np.mean(lengths), rel=0.01)
+
+
+def test_company_changes_from_epoch_to_epoch(clips):
+    first, second = (arrange([60] * 50, 10, seed=0, epoch=number) for number in (1, 2))
+    assert {tuple(batch) for batch in first} != {tuple(batch) for batch in second}
+
+
+def test_what_is_left_of_a_clip_that_is_too_long(clips):
+    short = replace(DEFAULT, longest_s=1.0)
+    np.testing.assert_array_equal(cut(clips[0], short).rotations, clips[0].rotations[:30])
+    last = cut(clips[0], replace(PAPER, longest_s=1.0))
+    np.testing.assert_array_equal(last.rotations, clips[0].rotations[-30:])
+    assert plain_stream(last, PAPER).weight[-1] > 0
+    assert cut(clips[0], PAPER) is clips[0]
+
+
 def test_the_seed_decides(clips):
     recipe = replace(DEFAULT, batch_size=8)
-    here, again, other = epoch(clips, recipe, 1), epoch(clips, recipe, 1), epoch(clips, recipe, 2)
+    here, again, other = epoch(clips, recipe, 1), epoch(clips, recipe, 1), epoch(clips, recipe, 1, 2)
     assert all(
         np.array_equal(a.rotations, b.rotations) and np.array_equal(a.mask, b.mask)
         for a, b in zip(here, again, strict=True)

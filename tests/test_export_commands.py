@@ -7,11 +7,13 @@ import torch
 import typer
 from typer.testing import CliRunner
 
-from datasets import motion, write_npz
-from fervor.errors import DataError, ModelFileError
+from datasets import motion, write_npz, write_rated
+from fervor.errors import DataError, InputError, ModelFileError
 from fervor.model import Model, check_row_independence
 from fervor_export import commands
 from fervor_export.checkpoint import load_checkpoint
+from fervor_export.clip import digest
+from fervor_export.synthetic import synthesise_dataset
 from networks import DEFAULT
 
 
@@ -41,12 +43,16 @@ def run(tmp_path_factory):
 def test_what_a_run_leaves(run):
     directory, output = run
     assert {path.name for path in directory.iterdir()} == {
-        "config.json", "metrics.json", "checkpoint.pt", "model.onnx", "model_card.md", "learned_from.json",
+        "config.json", "metrics.json", "curves.svg", "checkpoint.pt", "training.pt", "model.onnx", "model_card.md",
+        "learned_from.json",
     }  # fmt: skip
     assert "epoch   1" in output
-    assert f"{directory}: epoch 1 of 1" in output.replace("\n", "")
+    assert f"{directory}: epoch 1 of 1; on held-out clips MAE 0." in output.replace("\n", "")
     config = json.loads((directory / "config.json").read_text())
-    assert (config["recipe"]["name"], config["seed"], config["clips"]) == ("default", 4, 120)
+    assert (config["recipe"]["name"], config["seed"], config["data"]["clips"]) == ("default", 4, 120)
+    assert config["data"]["learned_from"] + config["data"]["chose_the_epoch"] == 120
+    assert config["data"]["sha256"] == digest(synthesise_dataset(clips=120, seed=4000))
+    assert config["libraries"]["torch"] == torch.__version__
     assert config["command"] == (
         "fervor train --data synthetic --recipe default --seed 4 --clips 120 --epochs 1 --threads 1"
     )
@@ -107,8 +113,10 @@ def test_a_refused_model_file_costs_no_training(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} == {
         "checkpoint.pt",
         "config.json",
+        "curves.svg",
         "metrics.json",
         "learned_from.json",
+        "training.pt",
     }
     assert load_checkpoint(tmp_path / "checkpoint.pt").purpose == "demo"
 
@@ -141,6 +149,47 @@ def test_a_data_set_of_ones_own(tmp_path, recipe):
     assert 3 <= model.metadata.training.recordings < 12  # the test actors are not among them
     learned = json.loads((out / "learned_from.json").read_text())
     assert len(learned["actors"]) == 3
+    held = model.metadata.levels.source
+    assert held == ("6 clips of 2 held-out actors" if recipe == "default" else "3 clips of 1 held-out actor")
+    assert ("validation_r" in model.metadata.scores) == (recipe == "default")
+
+
+def test_folds_judge_a_recipe_and_everybody_is_learned_from(tmp_path):
+    write_rated(tmp_path, count=24, actors=4)
+    out = tmp_path / "run"
+    options = ("train", "--data", str(tmp_path), "--epochs", "1", "--folds", "2", "--out", str(out))
+    done = invoke(*options)
+    assert done.exit_code == 0, done.output
+    assert "all clips, epoch   1" in done.output
+    assert "out of fold MAE 0." in done.output.replace("\n", "")
+    model = Model.load(out / "model.onnx")
+    assert model.metadata.levels.source == "out-of-fold predictions of 24 clips, 2 folds by actor"
+    assert {"actors_r", "actors_r_within", "actors_mae"} <= model.metadata.scores.keys()
+    assert len(json.loads((out / "learned_from.json").read_text())["recordings"]) == 24
+    card = (out / "model_card.md").read_text()
+    assert "| out of fold, actors left out |" in card
+    assert "nobody is left to judge it" in card
+    before = (out / "model.onnx").read_bytes()
+    again = invoke(*options)
+    assert "epoch   1  " not in again.output  # all is there
+    assert (out / "model.onnx").read_bytes() == before
+
+
+def test_another_seed_is_refused_unless_begun_anew(tmp_path):
+    write_rated(tmp_path, count=24, actors=4)
+    options = ["train", "--data", str(tmp_path), "--epochs", "1", "--out", str(tmp_path / "run")]
+    invoke(*options)
+    with pytest.raises(InputError, match=r"belongs to another training, .*seed 0 instead of 1"):
+        invoke(*options, "--seed", "1")
+    assert invoke(*options, "--seed", "1", "--restart").exit_code == 0
+    assert json.loads((tmp_path / "run" / "config.json").read_text())["seed"] == 1
+
+
+def test_time_that_ended_training_is_on_the_card(tmp_path):
+    out = tmp_path / "run"
+    invoke("train", "--clips", "40", "--epochs", "3", "--minutes", "0", "--out", str(out))
+    assert "Time ended training after epoch 1 of 3." in (out / "model_card.md").read_text()
+    assert json.loads((out / "metrics.json").read_text())["stopped"] == "time"
 
 
 def test_a_data_set_that_is_not_there_is_one_sentence():

@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 from fervor.errors import DataError
 from fervor_export import evaluate_command
 from fervor_export.checkpoint import TrainedNetwork, save_checkpoint
-from fervor_export.data.augment import augment
 from fervor_export.evaluation import duplicates
 from fervor_export.evaluation.estimator import NetworkEstimator, Reading
 from fervor_export.evaluation.evaluate import Evaluated, Material, Options, Watch, evaluate, evaluate_model
@@ -241,7 +240,7 @@ def test_few_actors_skip_what_they_do_not_allow():
 
 def test_actors_with_one_clip_and_labels_without_spread():
     made = [replace(clip, intensity=0.5, observers=None) for clip in clips(24, actors=24)]
-    done = evaluate(Material(made, "x", procedural=False), replace(PAPER, epochs=1), augment=augment, options=QUICK)
+    done = evaluate(Material(made, "x", procedural=False), replace(PAPER, epochs=1), options=QUICK)
     scores = done.result.protocols[0].predictor("network").scores
     assert (scores.r.value, scores.r_within.value, scores.spread.value) == (None, None, None)
     said = " ".join(done.result.warnings)

@@ -1,7 +1,9 @@
-"""What a run learns from: no actor on two sides, neutral left out, a manifest's own split kept."""
+"""What a run learns from: no actor on two sides, a manifest's own split kept."""
 
 from datasets import motion, write_npz
-from fervor_export.material import gather
+from fervor_export.data.dataset import load_dataset
+from fervor_export.material import Material, gather
+from fervor_export.recipe import DEFAULT, PAPER
 
 
 def manifest(folder, *, column=None):
@@ -22,23 +24,40 @@ def actors(clips):
 
 def test_no_actor_is_on_two_sides(tmp_path):
     for source in (manifest(tmp_path), "synthetic"):
-        material = gather(source, clips=300, seed=1)
+        material = gather(source, DEFAULT, clips=300, seed=1)
         sides = [actors(part) for part in (material.learn, material.validate, material.test)]
         assert all(sides)
         assert len(set.union(*sides)) == sum(map(len, sides))
         assert len(material.seen) == len(material.learn) + len(material.validate)
 
 
-def test_a_data_set_is_research_and_its_neutral_clips_are_left_out(tmp_path):
-    material = gather(manifest(tmp_path), clips=0, seed=0)
+def test_a_data_set_is_research_and_generated_motion_a_demo(tmp_path):
+    material = gather(manifest(tmp_path), DEFAULT, clips=0, seed=0)
     assert material.purpose == "research"
-    emotions = {clip.emotion for clip in [*material.seen, *material.test]}
-    assert emotions == {"joy"}
-    assert gather("synthetic", clips=100, seed=0).purpose == "demo"
+    assert {clip.emotion for clip in [*material.seen, *material.test]} == {"joy", "neutral"}
+    assert gather("synthetic", DEFAULT, clips=100, seed=0).purpose == "demo"
+
+
+def test_a_recipe_that_keeps_the_last_epoch_learns_from_everybody_but_the_test(tmp_path):
+    material = gather(manifest(tmp_path), PAPER, clips=0, seed=0)
+    assert material.validate == []
+    assert len(material.learn) + len(material.test) == 12
+    own = gather(manifest(tmp_path, column=["train", "train", "validation", "test"]), PAPER, clips=0, seed=0)
+    assert actors(own.learn) == {"actor 0", "actor 1", "actor 2"}
+    assert actors(own.test) == {"actor 3"}
+
+
+def test_a_whole_data_set_leaves_nobody_for_a_test(tmp_path):
+    data = load_dataset(manifest(tmp_path))
+    for recipe, validating in ((PAPER, 0), (DEFAULT, 1)):
+        material = Material.whole(data, recipe, seed=0)
+        assert len(material.seen) == 12
+        assert len(actors(material.validate)) == validating
+        assert material.test == []
 
 
 def test_a_manifests_own_split_is_kept(tmp_path):
-    material = gather(manifest(tmp_path, column=["train", "train", "validation", "test"]), clips=0, seed=0)
+    material = gather(manifest(tmp_path, column=["train", "train", "validation", "test"]), DEFAULT, clips=0, seed=0)
     assert actors(material.learn) == {"actor 0", "actor 1"}
     assert actors(material.validate) == {"actor 2"}
     assert actors(material.test) == {"actor 3"}

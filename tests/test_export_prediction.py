@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from fervor.emotions import EMOTIONS
-from fervor_export.prediction import Predictions, fit, level_rule, predict
+from fervor_export.prediction import Predictions, fit, predict
 from fervor_export.recipe import DEFAULT, PAPER
 from networks import network, waving_clips
 
@@ -17,17 +17,6 @@ def test_predictions_do_not_depend_on_company():
     for index, one in enumerate(alone):
         assert together.labelled[index] == pytest.approx(one.labelled[0], abs=1e-5)
         assert together.unlabelled[index] == pytest.approx(one.unlabelled[0], abs=1e-5)
-
-
-def test_thresholds_split_each_emotion_in_halves():
-    clips = waving_clips(44)
-    labelled = np.linspace(0, 1, 44)
-    rule = level_rule(clips, Predictions(labelled, labelled / 2))
-    for index, emotion in enumerate(EMOTIONS):
-        assert rule.threshold[emotion] == pytest.approx(np.median(labelled[index::11]), abs=0.006)
-    assert rule.threshold["unknown"] == 0.25
-    few = level_rule(clips[:1], Predictions(labelled[:1] + 0.4, labelled[:1]))
-    assert few.threshold["surprise"] == 0.4
 
 
 def test_the_paper_reads_the_last_frame_the_default_the_mean():
@@ -49,3 +38,12 @@ def test_the_fit_is_of_labelled_predictions():
     clips = waving_clips(12)
     target = np.asarray([clip.intensity for clip in clips])
     assert fit(clips, Predictions(target, np.zeros(12))).mae == 0
+
+
+def test_neutral_has_no_intensity_to_fit():
+    clips = waving_clips(22)
+    target = np.asarray([clip.intensity for clip in clips])
+    wrong = np.where([clip.emotion == "neutral" for clip in clips], 1 - target, target)
+    assert fit(clips, Predictions(wrong, wrong)).mae == 0
+    only = [clip for clip in clips if clip.emotion == "neutral"]
+    assert fit(only, Predictions(np.ones(2), np.ones(2))).mae > 0

@@ -8,10 +8,12 @@ import torch
 
 from fervor.errors import DataError
 from fervor_export.batches import pad, plain_stream
+from fervor_export.clip import Phase
+from fervor_export.objective import loss
 from fervor_export.prediction import fit, predict
-from fervor_export.recipe import DEFAULT, PAPER
+from fervor_export.recipe import DEFAULT, PAPER, RECIPES
 from fervor_export.scores import concordance
-from fervor_export.training import loss, split_by_actor, train
+from fervor_export.training import copies, sides, split_by_actor, train
 from networks import waving_clips
 
 QUICK = replace(DEFAULT, epochs=6, batch_size=16, learning_rate=5e-3, join=0.1, bind_noise_deg=1.0)
@@ -40,21 +42,49 @@ def test_a_split_keeps_actors_apart():
 
 def test_it_learns(split, result):
     assert result.history[-1].loss < 0.7 * result.history[0].loss
-    assert result.best.validation.r > 0.7
+    assert result.kept.validation.r > 0.7
     assert result.stopped == "epochs"
-    assert result.best.validation.mae == min(epoch.validation.mae for epoch in result.history)
+    assert result.kept.validation.mae == min(epoch.validation.mae for epoch in result.history)
 
 
 def test_the_best_weights_are_kept(split, result):
     scores = fit(split[1], predict(result.network, split[1], QUICK))
-    assert scores.as_dict() == pytest.approx(result.best.validation.as_dict(), abs=2e-4)
+    assert scores.as_dict() == pytest.approx(result.kept.validation.as_dict(), abs=2e-4)
 
 
-def test_the_paper_learns_too(split):
-    recipe = replace(PAPER, epochs=3, batch_size=16)
-    result = train(*split, recipe)
+def test_the_paper_learns_too_from_all_clips(split):
+    recipe = replace(PAPER, epochs=4, batch_size=16)
+    learn, validate = sides([*split[0], *split[1]], recipe)
+    assert (len(learn), validate) == (90, [])
+    result = train(learn, validate, recipe)
     assert result.history[-1].train_mae < result.history[0].train_mae
     assert result.network.config.features == "euler"
+    assert (result.kept, result.stopped) == (result.history[-1], "epochs")
+    assert {epoch.validation for epoch in result.history} == {None}
+
+
+def test_the_paper_is_followed_to_the_letter():
+    assert (PAPER.features, PAPER.head, PAPER.optimizer, PAPER.loss_at) == ("euler", "additive", "rmsprop", "last")
+    assert (PAPER.epochs, PAPER.batch_size, PAPER.mirror, PAPER.phases, PAPER.keep) == (100, 256, True, 4, "last")
+    assert (PAPER.ccc_weight, PAPER.unknown_share, PAPER.standardise, PAPER.patience) == (0.0, 0.0, False, None)
+    assert PAPER.steady
+    assert not DEFAULT.steady
+
+
+def test_copies_are_the_recipes(split):
+    clip = replace(split[0][0], phases=tuple([Phase(split[0][0].rotations, split[0][0].mask)] * 3))
+    assert len(copies([clip], PAPER)) == 8
+    assert copies([clip], DEFAULT) == [clip]
+    assert len(copies([clip], replace(DEFAULT, mirror=True))) == 2
+    assert {recipe.mirror for recipe in RECIPES.values()} == {True, False}
+
+
+def test_the_last_epoch_may_be_worse_than_the_best(split):
+    recipe = replace(QUICK, epochs=4, learning_rate=0.05, keep="last")
+    result = train(*split, recipe, seed=3)
+    assert result.kept.number == 4
+    scores = fit(split[1], predict(result.network, split[1], recipe))
+    assert scores.as_dict() == pytest.approx(result.history[-1].validation.as_dict(), abs=5e-4)
 
 
 def test_the_seed_decides(split):
@@ -86,6 +116,8 @@ def test_what_can_not_be_trained_on(split):
     learn, validate = split
     with pytest.raises(DataError, match="clips on both sides; there are 0"):
         train([], validate, QUICK)
+    with pytest.raises(DataError, match=r"clips on both sides; there are \d+ and 0"):
+        train(learn, [], QUICK)
     with pytest.raises(DataError, match=r"actors .* are among the training and"):
         train(learn, learn[:3], QUICK)
 
@@ -97,9 +129,9 @@ def test_loss_by_its_definition():
     last = np.asarray([float(predicted[row, clip.frames - 1]) for row, clip in enumerate(clips)])
     target = np.asarray([clip.intensity for clip in clips])
     error = np.abs(last - target).mean()
-    assert float(loss(predicted, batch, 0.0)) == pytest.approx(error, rel=1e-5)
+    assert float(loss(predicted, batch.target, batch.weight, 0.0)) == pytest.approx(error, rel=1e-5)
     expected = 0.7 * error + 0.3 * (1 - concordance(last, target))
-    assert float(loss(predicted, batch, 0.3)) == pytest.approx(expected, rel=1e-4)
+    assert float(loss(predicted, batch.target, batch.weight, 0.3)) == pytest.approx(expected, rel=1e-4)
 
 
 def test_padding_changes_no_gradient(split, result):

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
-    from fervor_export.clip import Clip
-    from fervor_export.recipe import Recipe
-    from fervor_export.training import TrainingResult
+    from fervor_export.run import Run
 
 
 def train(  # noqa: PLR0917  # typer calls it by name
@@ -17,35 +15,40 @@ def train(  # noqa: PLR0917  # typer calls it by name
     seed: Annotated[int, typer.Option(help="Of data, weights, order and augmentation.")] = 0,
     clips: Annotated[int, typer.Option(min=20, help="How many clips to synthesise, for `synthetic`.")] = 12000,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead of the recipe's.")] = None,
+    folds: Annotated[
+        int | None,
+        typer.Option(min=2, help="Judge by so many folds of actors, then learn from all.", show_default="some actors"),
+    ] = None,
     minutes: Annotated[float | None, typer.Option(min=0, help="Stop after the epoch that reaches this.")] = None,
     threads: Annotated[int, typer.Option(min=1, help="Of torch; more help only where cores are idle.")] = 1,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Begin anew what lies half done in the directory.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(help="Run directory.", show_default="runs/<data>-<recipe>-<seed>")] = None,
 ) -> None:
-    """Train a network; leaves checkpoint, model file, model card and figures in a run directory."""
+    """Train a network; leaves checkpoint, model file, model card and figures in a run directory.
+
+    Killed and typed again, it goes on after the last epoch that was done.
+    """
     from dataclasses import replace
 
     import torch
 
-    from fervor_export.data.augment import augment
-    from fervor_export.data.progress import loading_bar
-    from fervor_export.material import gather
-    from fervor_export.recipe import PAPER, RECIPES
-    from fervor_export.run import Run
+    from fervor_export.recipe import RECIPES
+    from fervor_export.run import STATE
+    from fervor_export.train_run import Order, train_run
 
     torch.set_num_threads(threads)
     chosen = RECIPES[recipe] if epochs is None else replace(RECIPES[recipe], epochs=epochs)
-    with loading_bar() as told:
-        material = gather(data, clips=clips, seed=seed, progress=told)
-    learn = augment(material.learn) if chosen.name == PAPER.name else material.learn
-    result = _train_visibly(learn, material.validate, chosen, seed=seed, minutes=minutes)
-    run = Run(data=data, material=material, recipe=chosen, seed=seed, threads=threads, result=result)
     directory = out or Path("runs") / f"{Path(data).stem}-{recipe}-{seed}"
-    trained = run.write(directory)
-    best, scores = result.best, trained.scores
-    typer.echo(
-        f"{directory}: epoch {best.number} of {len(result.history)}; on other actors MAE {scores['test_mae']:.3f}, "
-        f"r {scores['test_r']:.2f}, within emotion {scores['test_r_within']:.2f}"
-    )
+    if restart:
+        (directory / STATE).unlink(missing_ok=True)
+    order = Order(
+        data=data, recipe=chosen, seed=seed, clips=clips, folds=folds, minutes=minutes, threads=threads
+    )  # fmt: skip
+    run = train_run(order, directory)
+    run.write(directory)
+    typer.echo(in_short(run, directory))
 
 
 def export(  # noqa: PLR0917  # typer calls it by name
@@ -80,33 +83,14 @@ def _add_to_repository(model_file: Path, repository: Path) -> None:
     typer.echo(f"{write_repository(model_file, repository)}: a version for Triton")
 
 
-def _train_visibly(
-    learn: "list[Clip]", validate: "list[Clip]", recipe: "Recipe", *, seed: int, minutes: float | None
-) -> "TrainingResult":
-    """Train with a progress bar and a line per epoch."""
-    from rich.progress import Progress
-
-    from fervor_export.training import Epoch
-    from fervor_export.training import train as run_training
-
-    with Progress() as progress:
-        task = progress.add_task(f"{len(learn)} clips", total=recipe.epochs * len(learn))
-
-        def show(epoch: Epoch) -> None:
-            scores = epoch.validation
-            progress.console.print(
-                f"epoch {epoch.number:3}  train MAE {epoch.train_mae:.4f}  validation MAE {scores.mae:.4f}"
-                f"  r {scores.r:.3f}  within {scores.r_within:.3f}  CCC {scores.ccc:.3f}  {epoch.seconds:.0f} s",
-                highlight=False,
-                soft_wrap=True,
-            )
-
-        return run_training(
-            learn,
-            validate,
-            recipe,
-            seed=seed,
-            max_minutes=minutes,
-            on_epoch=show,
-            on_batch=lambda count: progress.advance(task, count),
-        )
+def in_short(run: "Run", directory: Path) -> str:
+    """One line of a finished run."""
+    scores, result = run.judgement.scores, run.result
+    prefix = next((part for part in ("test_", "actors_", "recordings_", "given_") if part + "mae" in scores), "")
+    way = "on held-out clips" if prefix == "test_" else "out of fold"
+    told = ", ".join(
+        f"{title} {scores[prefix + name]:.2f}"
+        for name, title in (("mae", "MAE"), ("r", "r"), ("r_within", "within emotion"))
+        if prefix + name in scores
+    )
+    return f"{directory}: epoch {result.kept.number} of {len(result.history)}; {way} {told or 'nothing is defined'}"

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from fervor_export.evaluation.estimator import Estimator, Reading
     from fervor_export.evaluation.evaluate import Evaluated, Material, Options, Watch
     from fervor_export.evaluation.held_out import LearnedFrom
-    from fervor_export.evaluation.protocols import Augment
     from fervor_export.recipe import Recipe
     from fervor_export.training import Epoch
 
@@ -74,9 +73,7 @@ def _evaluate_visibly(
         material = _load(data, clips, options.seed, progress)
         if checkpoint is not None:
             return _judge(checkpoint, material, options, _watch(progress, None))
-        return run_evaluation(
-            material, recipe, augment=_copies_of(recipe), options=options, watch=_watch(progress, recipe)
-        )
+        return run_evaluation(material, recipe, options=options, watch=_watch(progress, recipe))
 
 
 def _load(data: str, clips: int, seed: int, progress: "Progress") -> "Material":
@@ -96,14 +93,6 @@ def _load(data: str, clips: int, seed: int, progress: "Progress") -> "Material":
     return Material.of(loaded)
 
 
-def _copies_of(recipe: "Recipe") -> "Augment":
-    """The copies that a recipe asks of the data: the paper's are the data's, others make theirs while they train."""
-    from fervor_export.data.augment import augment
-    from fervor_export.recipe import PAPER
-
-    return augment if recipe.name == PAPER.name else list
-
-
 def _watch(progress: "Progress", recipe: "Recipe | None") -> "Watch":
     """Bars for the trainings, and for the epochs of the one under way."""
     from fervor_export.evaluation.evaluate import Watch
@@ -118,7 +107,8 @@ def _watch(progress: "Progress", recipe: "Recipe | None") -> "Watch":
 
     def epoch(done: "Epoch") -> None:
         if inside is not None:
-            described = f"epoch, validation r within {done.validation.r_within:.2f}"
+            scores = done.validation
+            described = "epoch" if scores is None else f"epoch, validation r within {scores.r_within:.2f}"
             progress.update(inside, completed=done.number, description=described)
 
     return Watch(stage, epoch)

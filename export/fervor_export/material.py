@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from fervor_export.clip import Clip
-from fervor_export.data.dataset import CAST_CLIPS, SYNTHETIC, load_dataset
+from fervor_export.data.dataset import CAST_CLIPS, SYNTHETIC, Dataset, load_dataset
+from fervor_export.recipe import Recipe
 from fervor_export.synthetic import synthesise_dataset
-from fervor_export.training import split_by_actor
+from fervor_export.training import sides, split_by_actor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,9 +20,11 @@ class Material:
     everything: list[Clip] = field(repr=False)
     """All clips of the data set."""
     learn: list[Clip] = field(repr=False)
+    """The copies that a recipe asks for are not among them."""
     validate: list[Clip] = field(repr=False)
+    """For the choice of the epoch; none where the recipe keeps the last."""
     test: list[Clip] = field(repr=False)
-    """Seen neither by training nor by the choice of the epoch."""
+    """Seen neither by training nor by the choice of the epoch; none where folds judge the recipe."""
 
     @property
     def seen(self) -> list[Clip]:
@@ -29,26 +32,41 @@ class Material:
         ours = {id(clip) for clip in (*self.learn, *self.validate)}
         return [clip for clip in self.everything if id(clip) in ours]
 
+    @classmethod
+    def whole(cls, data: Dataset, recipe: Recipe, *, seed: int) -> "Material":
+        """All clips to learn from, for a network whose recipe was judged by folds.
 
-def gather(source: str, *, clips: int, seed: int, progress: Callable[[int, int], None] = lambda *_: None) -> Material:
-    """The clips of `source`: "synthetic", or what `load_dataset` takes.
+        Raises:
+            DataError: fewer than two actors, where the recipe chooses the epoch by some.
+        """
+        learn, validate = sides(data.clips, recipe, seed=seed)
+        return cls(data.description, data.purpose, data.clips, learn, validate, [])
 
-    Clips recognised as neutral have no intensity and are left out of data sets. A manifest's own split is kept.
+
+def gather(
+    source: str, recipe: Recipe, *, clips: int, seed: int, progress: Callable[[int, int], None] = lambda *_: None
+) -> Material:
+    """The clips of `source`: "synthetic", or what `load_dataset` takes; some actors are kept for the test.
+
+    A manifest's own split is kept.
 
     Raises:
-        DataError: the data set can't be used, or has fewer than three actors and no split of its own.
+        DataError: the data set can't be used, or has too few actors and no split of its own.
     """
     data = load_dataset(source, progress=progress, clips=clips, seed=seed)
+    given = data.splits
     if source == SYNTHETIC:
-        learn, validate = split_by_actor(data.clips, seed=seed)
-        return Material(data.description, data.purpose, data.clips, learn, validate, _another_cast(clips, seed))
-    intense = set(map(id, data.intense))
-    given = {name: [clip for clip in part if id(clip) in intense] for name, part in data.splits.items()}
-    if given.get("train") and given.get("test"):
+        rest, test = data.clips, _another_cast(clips, seed)
+    elif given.get("train") and given.get("test"):
         rest, test = given["train"], given["test"]
     else:
-        rest, test = split_by_actor(data.intense, seed=seed)
-    learn, validate = (rest, given["validation"]) if given.get("validation") else split_by_actor(rest, seed=seed)
+        rest, test = split_by_actor(data.clips, seed=seed)
+    if not given.get("validation"):
+        learn, validate = sides(rest, recipe, seed=seed)
+    elif recipe.keep == "last":
+        learn, validate = [*rest, *given["validation"]], []
+    else:
+        learn, validate = rest, given["validation"]
     return Material(data.description, data.purpose, data.clips, learn, validate, test)
 
 

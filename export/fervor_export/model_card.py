@@ -13,19 +13,31 @@ _INTENDED = {
 
 _SCORES = {
     "mae": "mean absolute error",
-    "r": "Pearson r, all clips",
+    "r": "Pearson r, all emotions but neutral",
+    "r_all": "Pearson r, neutral too",
     "r_within": "Pearson r within emotion",
     "ccc": "concordance (CCC)",
     "spread": "spread of predictions / of targets",
 }
 
 
-def model_card(metadata: ModelMetadata, *, command: str) -> str:
+_PARTS = {
+    "test": "held-out clips",
+    "validation": "clips that chose the epoch",
+    "given": "out of fold, the data's own split",
+    "recordings": "out of fold, by recording",
+    "actors": "out of fold, actors left out",
+}
+"""What scores are of, by what stands before their names."""
+
+
+def model_card(metadata: ModelMetadata, *, command: str, ended: str = "") -> str:
     """The card of a model file, in Markdown.
 
     Args:
         metadata: what the file says of itself.
         command: what trains it again.
+        ended: a sentence to add if training ended before its time.
     """
     states = ", ".join(f"{state.name} {list(state.shape)}" for state in metadata.states)
     libraries = ", ".join(f"{name} {version}" for name, version in metadata.libraries.items())
@@ -42,15 +54,14 @@ is meant, whatever it is. Neutral has no intensity of its own: there the number 
 States: {states}.
 
 **What it learned from.** {metadata.training.description[:1].upper()}{metadata.training.description[1:]}:
-{metadata.training.recordings} clips, {metadata.training.hours:g} hours; SHA-256 `{metadata.training.sha256[:16]}…`.
-Actors used to choose the epoch are no training actors; test actors are neither.
+{metadata.training.recordings} recordings, {metadata.training.hours:g} hours; SHA-256
+`{metadata.training.sha256[:16]}…`.{" " + ended if ended else ""}
 
-| | test | validation |
-|---|---|---|
-{_score_rows(metadata)}
+{_scores(metadata)}
 
-**Levels.** Weak below the threshold, strong from it on: the median estimate for that emotion. Hysteresis
-± {metadata.levels.hysteresis:g}, held at least {metadata.levels.dwell_s:g} s.
+**Levels.** Weak below the threshold, strong from it on. A threshold is where the weaker and the stronger half of an
+emotion's clips are told apart best, chosen by {metadata.levels.source or "nobody knows whose predictions"}.
+Hysteresis ± {metadata.levels.hysteresis:g}, held at least {metadata.levels.dwell_s:g} s.
 
 | {" | ".join(metadata.levels.threshold)} |
 |{"---|" * len(metadata.levels.threshold)}
@@ -62,9 +73,23 @@ Licence: {metadata.license}.
 """
 
 
-def _score_rows(metadata: ModelMetadata) -> str:
-    rows = []
+def _scores(metadata: ModelMetadata) -> str:
+    """Scores as a table, a column for what they are of; and what that means."""
+    parts = [part for part in _PARTS if any(f"{part}_{name}" in metadata.scores for name in _SCORES)]
+    if not parts:
+        return "Nobody has judged it."
+    rows = ["| | " + " | ".join(_PARTS[part] for part in parts) + " |", "|---|" + "---|" * len(parts)]
     for name, title in _SCORES.items():
-        values = (metadata.scores.get(f"{part}_{name}") for part in ("test", "validation"))
-        rows.append(f"| {title} | " + " | ".join("-" if value is None else f"{value:.3f}" for value in values) + " |")
-    return "\n".join(rows)
+        values = [metadata.scores.get(f"{part}_{name}") for part in parts]
+        if any(value is not None for value in values):
+            rows.append(
+                f"| {title} | " + " | ".join("-" if value is None else f"{value:.3f}" for value in values) + " |"
+            )
+    folds = not {"test", "validation"} & set(parts)
+    note = (
+        "Out of fold: every clip was judged by a network that learned from the others, by the same recipe. This "
+        "network has learned from all of them, and nobody is left to judge it."
+        if folds
+        else "Nothing was learned from held-out clips, nor from those that chose the epoch."
+    )
+    return "\n".join([*rows, "", note])

@@ -144,12 +144,17 @@ class Network(nn.Module):
         """
         before = self.zero_states(len(rotations)) if states is None else states
         seen, after = self.features(rotations, mask, before)
+        descriptor, recurrent = self.describe(seen, before)
+        return self.head(descriptor), after | recurrent
+
+    def describe(self, seen: Tensor, before: Mapping[str, Tensor]) -> tuple[Tensor, dict[str, Tensor]]:
+        """Descriptors [batch, time, descriptor] of features [batch, time, feature], and the next recurrent states."""
         hidden, (h1, c1) = self.lstm1(
             (seen - self.mean) * self.scale, (before["h1"].unsqueeze(0), before["c1"].unsqueeze(0))
         )
         descriptor, (h2, c2) = self.lstm2(hidden, (before["h2"].unsqueeze(0), before["c2"].unsqueeze(0)))
-        after.update(h1=h1.squeeze(0), c1=c1.squeeze(0), h2=h2.squeeze(0), c2=c2.squeeze(0))
-        return self.head(descriptor), after
+        after = {"h1": h1.squeeze(0), "c1": c1.squeeze(0), "h2": h2.squeeze(0), "c2": c2.squeeze(0)}
+        return descriptor, after
 
     def forward(
         self, rotations: Tensor, mask: Tensor, emotion: Tensor, states: Mapping[str, Tensor] | None = None

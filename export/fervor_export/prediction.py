@@ -1,4 +1,4 @@
-"""What a network says of clips, how well it fits, and the thresholds between weak and strong that follow.
+"""What a network says of clips, and how well it fits.
 
 A clip's prediction is its last frame's intensity, or the mean over its frames after the first second, as the recipe's
 loss has it.
@@ -12,11 +12,11 @@ import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from fervor.emotions import EMOTIONS, UNKNOWN
-from fervor.metadata import LevelRule
-from fervor_export.batches import Batch, pad, plain_stream
+from fervor_export.batches import GROUP, Batch, pad, plain_stream
 from fervor_export.clip import Clip
+from fervor_export.data.label import NEUTRAL
 from fervor_export.network import Network
+from fervor_export.prepared import PreparedBatch
 from fervor_export.recipe import Recipe
 from fervor_export.scores import Scores, score
 
@@ -31,7 +31,7 @@ class Predictions:
     unlabelled: Floats  # [clip] under no emotion
 
 
-def predict(network: Network, clips: Sequence[Clip], recipe: Recipe, *, batch_size: int = 256) -> Predictions:
+def predict(network: Network, clips: Sequence[Clip], recipe: Recipe, *, batch_size: int = GROUP) -> Predictions:
     """One number per clip, with and without its emotion label."""
     order = sorted(range(len(clips)), key=lambda index: clips[index].frames)
     predicted = np.zeros((2, len(clips)))
@@ -48,28 +48,22 @@ def predict(network: Network, clips: Sequence[Clip], recipe: Recipe, *, batch_si
     return Predictions(*predicted)
 
 
-def intensities(network: Network, batch: Batch) -> tuple[Tensor, Tensor]:
+def intensities(network: Network, batch: Batch | PreparedBatch) -> tuple[Tensor, Tensor]:
     """Intensities [batch, time] under each frame's emotion, and under none."""
-    logits, _ = network.logits(batch.rotations, batch.mask)  # [batch, time, 12]
+    reset = network.zero_states(len(batch.target))
+    if isinstance(batch, PreparedBatch):
+        seen = batch.features
+    else:
+        seen, _ = network.features(batch.rotations, batch.mask, reset)
+    descriptor, _ = network.describe(seen, reset)
+    logits = network.head(descriptor)  # [batch, time, 12]
     labelled = logits.gather(-1, batch.emotion.unsqueeze(-1)).squeeze(-1)
     return labelled.sigmoid(), logits[..., -1].sigmoid()
 
 
 def fit(clips: Sequence[Clip], predictions: Predictions) -> Scores:
-    """How the labelled predictions fit the clips' intensities."""
-    target = np.asarray([clip.intensity for clip in clips])
-    return score(predictions.labelled, target, [clip.emotion for clip in clips])
-
-
-def level_rule(clips: Sequence[Clip], predictions: Predictions) -> LevelRule:
-    """Thresholds between weak and strong: the median prediction of each emotion's clips, which splits them in halves.
-
-    Emotions without clips get the median over all.
-    """
+    """How the labelled predictions fit the clips' intensities; neutral, which has none, is left out if it can be."""
     emotions = np.asarray([clip.emotion for clip in clips])
-    pooled = float(np.median(predictions.labelled))
-    threshold = {
-        emotion: float(np.median(predictions.labelled[emotions == emotion])) if (emotions == emotion).any() else pooled
-        for emotion in EMOTIONS
-    } | {UNKNOWN: float(np.median(predictions.unlabelled))}
-    return LevelRule(threshold={emotion: round(value, 2) for emotion, value in threshold.items()})
+    felt = emotions != NEUTRAL if (emotions != NEUTRAL).any() else np.full(len(clips), fill_value=True)
+    target = np.asarray([clip.intensity for clip in clips])
+    return score(predictions.labelled[felt], target[felt], emotions[felt].tolist())

@@ -22,6 +22,12 @@ class Recipe:
     batch_size: int
     loss_at: Literal["last", "frames"]
     """The last frame's intensity only, or that of every frame from `settle_s` on."""
+    mirror: bool = False
+    """Whether every clip is learned from as its mirror image too."""
+    phases: int = 1
+    """How many 30 Hz phases of a fast recording are learned from, at most."""
+    keep: Literal["best", "last"] = "best"
+    """Which epoch's weights: the best on actors kept for it, or the last, and then nobody has to be kept."""
     standardise: bool = False
     """Whether features go in at mean 0 and deviation 1; folded into the weights at the end."""
     weight_decay: float = 0.0
@@ -49,7 +55,13 @@ class Recipe:
     bind_noise_deg: float = 0.0
     """Standard deviation of a constant turn of each joint: sensors differ in where they mount their axes."""
     patience: int | None = None
-    """Epochs without a better validation error after which training ends."""
+    """Epochs without a better validation error after which training ends; where `keep` is "best"."""
+
+    @property
+    def steady(self) -> bool:
+        """Whether a clip is the same in every epoch, so that its features need to be computed only once."""
+        chances = (self.crop, self.join, self.joint_dropout, self.leg_dropout, self.wrist_dropout, self.trunk_dropout)
+        return not any((*chances, self.bind_noise_deg))
 
 
 PAPER = Recipe(
@@ -61,8 +73,11 @@ PAPER = Recipe(
     epochs=100,
     batch_size=256,
     loss_at="last",
+    mirror=True,
+    phases=4,
+    keep="last",  # the paper names neither validation actors nor early stopping
 )
-"""Sun et al., section IV-B, to the letter; mirroring and the four 30 Hz phases are the data's."""
+"""Sun et al., section IV-B, to the letter."""
 
 DEFAULT = Recipe(
     name="default",

@@ -8,6 +8,7 @@ and controls then learn from the other actors of these clips.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from fervor.errors import DataError
 from fervor_export.clip import Clip
@@ -16,7 +17,7 @@ from fervor_export.evaluation import baseline, duplicates, handcrafted
 from fervor_export.evaluation.drift import MINUTES, STREAMS, drift
 from fervor_export.evaluation.estimator import Estimator, Reading
 from fervor_export.evaluation.invariance import MOST_CLIPS, invariance
-from fervor_export.evaluation.protocols import Augment, Budget, Learn, Learned, Learner, Run, run
+from fervor_export.evaluation.protocols import Budget, Learn, Learned, Learner, Run, run
 from fervor_export.evaluation.result import Evaluation
 from fervor_export.evaluation.splits import Split, Unit, as_given, by_actor, by_recording
 from fervor_export.evaluation.summary import describe, summarise, thresholds_of, warnings_of, warnings_of_split
@@ -88,7 +89,7 @@ def evaluate(
     material: Material,
     recipe: Recipe,
     *,
-    augment: Augment = list,
+    keep: Path | None = None,
     options: Options | None = None,
     watch: Watch | None = None,
 ) -> Evaluated:
@@ -97,7 +98,7 @@ def evaluate(
     Args:
         material: the data set.
         recipe: how to learn.
-        augment: makes the copies that the recipe asks of the data, of clips that are learned from.
+        keep: folder of what was trained so far: an evaluation that is begun again goes on from it.
         options: how thorough.
         watch: whom to tell.
 
@@ -105,8 +106,8 @@ def evaluate(
         DataError: no protocol can be run with these clips; says why.
     """
     options, watch = options or Options(), watch or Watch()
-    learner = Learner(recipe, options.seed, watch.epoch, augment)
-    work = _Work(material, options, watch, Reading.of(recipe), f"recipe {recipe.name}")
+    learner = Learner(recipe, options.seed, watch.epoch, keep=keep)
+    work = _Work(material, options, watch, Reading.of(recipe), f"recipe {recipe.name}", keep)
     work.find_repeats()
     work.split()
     work.run_all(learner.learn)
@@ -166,6 +167,7 @@ class _Work:
     watch: Watch
     reading: Reading
     model: str
+    keep: Path | None = None
     repeats: dict[str, str] = field(default_factory=dict)
     splits: dict[str, Split] = field(default_factory=dict)
     skipped: dict[str, str] = field(default_factory=dict)
@@ -219,7 +221,7 @@ class _Work:
             try:
                 self.runs[name] = run(
                     self.material.clips, split, learn, self.reading, handcrafted=features, grid=self.options.grid,
-                    budget=budget, seed=self.options.seed, tell=stage,
+                    keep=self.keep, budget=budget, seed=self.options.seed, tell=stage,
                 )  # fmt: skip
             except DataError as error:
                 self.skipped[name] = error.message

@@ -8,16 +8,19 @@ inside the training clips. What a network is trained on is checked against what 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from fervor_export.clip import Clip
+from fervor_export.clip import Clip, digest
 from fervor_export.evaluation import baseline, controls
 from fervor_export.evaluation.estimator import Estimates, Estimator, Motion, NetworkEstimator, Reading
+from fervor_export.evaluation.remembered import remembered
 from fervor_export.evaluation.splits import Fold, Split, Unit, assert_disjoint
 from fervor_export.recipe import Recipe
-from fervor_export.training import Epoch, split_by_actor, train
+from fervor_export.training import Epoch, copies, sides, train
+from fervor_export.training_state import identity, name_of
 
 Floats = npt.NDArray[np.float64]
 Augment = Callable[[Sequence[Clip]], Sequence[Clip]]
@@ -61,6 +64,8 @@ class Learned:
     epochs: int = 0
     best_epoch: int = 0
     stopped: str = "not trained here"
+    seconds: float = 0.0
+    """Of training, interruptions left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,20 +75,33 @@ class Learner:
     recipe: Recipe
     seed: int = 0
     on_epoch: Callable[[Epoch], None] = lambda _: None
-    augment: Augment = list
-    """Makes the copies that a recipe asks of the data; given the clips that are learned from, and no others."""
+    augment: Augment | None = None
+    """Makes copies instead of the recipe; given the clips that are learned from, and no others."""
+    keep: Path | None = None
+    """Folder of trainings under way and done, each under a name of its own: what is there is gone on with."""
 
     def learn(self, clips: Sequence[Clip], test: Sequence[Clip], unit: Unit, minutes: float | None) -> Learned:
-        """Train on clips, a fifth of their actors kept for choosing the epoch.
+        """Train on clips; a fifth of their actors are kept for choosing the epoch, if the recipe chooses.
 
         Raises:
             DataError: too few actors, or a leak.
         """
-        learn, validate = split_by_actor(clips, seed=self.seed)
-        copies = self.augment(learn)
-        assert_disjoint([*copies, *validate], test, unit=unit)
-        result = train(copies, validate, self.recipe, seed=self.seed, max_minutes=minutes, on_epoch=self.on_epoch)
-        return Learned(NetworkEstimator(result.network), len(result.history), result.best.number, result.stopped)
+        learn, validate = sides(clips, self.recipe, seed=self.seed)
+        made = self.augment(learn) if self.augment else copies(learn, self.recipe)
+        assert_disjoint([*made, *validate], test, unit=unit)
+        state = None
+        if self.keep is not None:
+            state = self.keep / f"{name_of(identity(made, validate, self.recipe, seed=self.seed))}.pt"
+        result = train(
+            made, validate, self.recipe, seed=self.seed, max_minutes=minutes, state=state, on_epoch=self.on_epoch
+        )
+        return Learned(
+            NetworkEstimator(result.network),
+            len(result.history),
+            result.kept.number,
+            result.stopped,
+            result.history[-1].seconds,
+        )
 
 
 @dataclass(slots=True)
@@ -126,8 +144,9 @@ def run(
     learn: Learn,
     reading: Reading,
     *,
-    handcrafted: Floats,
+    handcrafted: Floats | None,
     grid: baseline.Grid = baseline.GRID,
+    keep: Path | None = None,
     budget: Budget | None = None,
     seed: int = 0,
     tell: Tell = lambda _what, _fold: None,
@@ -139,8 +158,9 @@ def run(
         split: its folds.
         learn: how the network of a fold is come by.
         reading: how a clip's estimates become one number.
-        handcrafted: features [clip, feature] of the clips.
+        handcrafted: features [clip, feature] of the clips; None for the network alone, without baseline and controls.
         grid: the baseline's settings.
+        keep: folder in which the baseline's predictions are kept, so that they are made once.
         budget: of training.
         seed: of the wrong emotions.
         tell: told what begins, and how many folds are done.
@@ -152,20 +172,21 @@ def run(
     folds, estimates = np.zeros(len(clips), np.intp), [np.empty((0, 12), np.float32)] * len(clips)
     judged, trainings = [], []
     for number, fold in enumerate(split):
-        sides = [clips[index] for index in fold.train], [clips[index] for index in fold.test]
-        assert_disjoint(*sides, unit=split.unit)
+        parts = [clips[index] for index in fold.train], [clips[index] for index in fold.test]
+        assert_disjoint(*parts, unit=split.unit)
         tell(f"fold {number + 1} of {len(split)}, network", number)
-        started = time.monotonic()
-        learned = learn(*sides, split.unit, budget.next() if budget else None)
-        trainings.append(_training(learned, sides, time.monotonic() - started))
-        answers = learned.estimator.estimate([Motion.of(clip) for clip in sides[1]])
+        learned = learn(*parts, split.unit, budget.next() if budget else None)
+        trainings.append(_training(learned, parts))
+        answers = learned.estimator.estimate([Motion.of(clip) for clip in parts[1]])
         tell(f"fold {number + 1} of {len(split)}, baseline", number)
-        said = _of_network(sides[1], answers, reading, seed + number) | _of_others(sides, fold, handcrafted, grid)
+        said = _of_network(parts[1], answers, reading, seed + number)
+        if handcrafted is not None:
+            said |= _of_others(parts, fold, handcrafted, grid, keep)
         for name, values in said.items():
             predictions[name][list(fold.test)] = values
         for index, answer in zip(fold.test, answers, strict=True):
             folds[index], estimates[index] = number, answer
-        judged.append((learned.estimator, tuple(sides[1])))
+        judged.append((learned.estimator, tuple(parts[1])))
     rows = sorted(index for fold in split for index in fold.test)
     return Run(
         clips=tuple(clips[row] for row in rows),
@@ -179,10 +200,9 @@ def run(
     )
 
 
-def _training(learned: Learned, sides: tuple[list[Clip], list[Clip]], seconds: float) -> FoldTraining:
-    return FoldTraining(
-        len(sides[0]), len(sides[1]), learned.epochs, learned.best_epoch, learned.stopped, round(seconds, 1)
-    )
+def _training(learned: Learned, parts: tuple[list[Clip], list[Clip]]) -> FoldTraining:
+    seconds = round(learned.seconds, 1)
+    return FoldTraining(len(parts[0]), len(parts[1]), learned.epochs, learned.best_epoch, learned.stopped, seconds)
 
 
 def _of_network(test: Sequence[Clip], estimates: Sequence[Estimates], reading: Reading, seed: int) -> dict[str, Floats]:
@@ -193,11 +213,18 @@ def _of_network(test: Sequence[Clip], estimates: Sequence[Estimates], reading: R
 
 
 def _of_others(
-    sides: tuple[list[Clip], list[Clip]], fold: Fold, handcrafted: Floats, grid: baseline.Grid
+    sides: tuple[list[Clip], list[Clip]], fold: Fold, handcrafted: Floats, grid: baseline.Grid, keep: Path | None
 ) -> dict[str, Floats]:
     """What the baseline and the controls say."""
-    train_clips, test = sides
     features = handcrafted[list(fold.train)], handcrafted[list(fold.test)]
+    causes = (*map(digest, sides), *features, grid) if keep else ()
+    return remembered(keep, causes, lambda: _fit_others(sides, features, grid))
+
+
+def _fit_others(
+    sides: tuple[list[Clip], list[Clip]], features: tuple[Floats, Floats], grid: baseline.Grid
+) -> dict[str, Floats]:
+    train_clips, test = sides
     said = {
         EMOTION_MEAN: controls.emotion_mean(train_clips, test),
         "speed": controls.mean_speed(train_clips, test),
