@@ -35,7 +35,7 @@ SAMPLE = ROOT / "service" / "fervor" / "samples" / "joy.bvh"
 RECORDINGS = ("walk.bvh", "run.bvh")
 """Recordings of the reader's, in the pages."""
 
-LONG = frozenset({"serve", "demo", "train", "reproduce", "evaluate", "export", "bench"})
+LONG = frozenset({"serve", "demo", "train", "reproduce", "ablate", "evaluate", "export", "bench"})
 """Commands that don't end soon, or need what those leave."""
 
 HOSTS = ("127.0.0.1", "robot.local")
