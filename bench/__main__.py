@@ -1,16 +1,17 @@
-"""`make bench`: the cost of a frame inside the service, then the service beside a naive one and the floor, quickly.
+"""`make bench`: a frame's cost inside the service, training's cost, then the service beside a naive one and the floor.
 
-`fervor bench` does the second part at length.
+Quickly: `fervor bench` does the last part at length.
 """
 
 import sys
 
 from rich.console import Console
 
+from bench.training import loading, training
 from fervor.cli.main import run
 from fervor_bench.frame_cost import frame_costs
 
 if __name__ == "__main__":
-    for table in frame_costs():
+    for table in (*frame_costs(), training(), loading()):
         Console().print(table)
     sys.exit(run(["bench", "--quick", *sys.argv[1:]]))
