@@ -29,10 +29,10 @@ TREE = {
 }
 
 
-def fervor(*arguments: object, **options) -> "subprocess.CompletedProcess[str]":
+def fervor(*arguments: object, timeout: float = 60, **options) -> "subprocess.CompletedProcess[str]":
     """Run the program to its end, its output captured."""
     return subprocess.run(
-        [FERVOR, *map(str, arguments)], capture_output=True, text=True, timeout=60, check=False, **options
+        [FERVOR, *map(str, arguments)], capture_output=True, text=True, timeout=timeout, check=False, **options
     )
 
 
