@@ -70,7 +70,7 @@ class Experiment:
         """
         shared = None if self.minutes is None else self.minutes * (1.0 - 1.0 / self.trainings(data))
         judged = evaluate(
-            Judged(data.clips, data.description, data.kind == SYNTHETIC, data.splits),
+            Judged.of(data),
             self.recipe,
             keep=directory / FOLDS,
             options=options or Options(folds=self.folds, seed=self.seed, minutes=shared),
