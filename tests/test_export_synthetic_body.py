@@ -176,12 +176,19 @@ MEASURES = [
     ("joy", arm_speed, 1), ("anger", arm_speed, 1), ("sadness", arm_speed, -1), ("sadness", slump, 1),
     ("shame", slump, 1), ("pride", slump, -1), ("disgust", yaw, 1), ("amusement", shaking, 1), ("fear", trembling, 1),
     ("relief", lambda m: float(np.degrees(rotations.to_rotvec(joint(m, "chest")))[:, 0].std()), 1),
-    ("surprise", lambda m: float(np.log(speeds(m, "spine", "chest", "head").max())), 1),
+    ("surprise", lambda m: float(np.log(speeds(m, "spine", "chest").max())), 1),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("emotion", "measure", "sign"), MEASURES)
 def test_what_shows_grows_with_intensity_over_many_people(emotion: str, measure, sign: int) -> None:
     levels = np.linspace(0.0, 1.0, 80)
-    seen = np.array([measure(take(emotion, level, 100 + index)) for index, level in enumerate(levels)])
+    seen = np.array([measure(calm(emotion, level, 100 + index)) for index, level in enumerate(levels)])
     assert sign * spearman(levels, seen) > 0.35
+
+
+def calm(emotion: str, level: float, seed: int) -> np.ndarray:
+    """A take in which the task itself is neither lively nor slow, so that fewer people are enough to see the rest."""
+    scene = dataclasses.replace(Scene.draw(np.random.default_rng(seed), "stand"), vigour=1.0)
+    events = (1.5,) if emotion in STARTLING else ()
+    return synthesise_motion(emotion=emotion, intensity=level, seconds=5.0, seed=seed, scene=scene, events=events)[1]

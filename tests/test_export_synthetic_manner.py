@@ -9,7 +9,7 @@ from fervor.emotions import EMOTIONS
 from fervor_export.synthetic.channels import CHANNELS, INDEX
 from fervor_export.synthetic.manner import Manner, habit
 from fervor_export.synthetic.motion import constant
-from fervor_export.synthetic.person import Person
+from fervor_export.synthetic.person import USUAL_STEP_HZ, Person
 from fervor_export.synthetic.scene import Scene
 
 TIMES = np.linspace(0.0, 4.0, 121)
@@ -20,8 +20,9 @@ NOTHING = np.zeros(len(CHANNELS))
 def average_person(seed: int = 0) -> Person:
     person = Person.draw(np.random.default_rng(seed), "somebody")
     return dataclasses.replace(
-        person, idiom=NOTHING, tempo=1.0, size=1.0, rate=1.0, unrest=1.0, slump=0.0, lean=0.0, head=0.0
-    )
+        person, idiom=NOTHING, tempo=1.0, size=1.0, rate=1.0, unrest=1.0, nod=1.0, slump=0.0, lean=0.0, head=0.0,
+        step_hz=USUAL_STEP_HZ,
+    )  # fmt: skip
 
 
 def manner(emotion: str, level: float, person: Person | None = None, variety: float = 0.0) -> Manner:
@@ -54,7 +55,7 @@ def test_gestures_that_nobody_makes_show_less() -> None:
 
 
 def test_a_lively_person_looks_more_joyful_and_less_sad_to_strangers() -> None:
-    scene = dataclasses.replace(Scene.draw(np.random.default_rng(0)), vigour=1.0)
+    scene = dataclasses.replace(Scene.draw(np.random.default_rng(0)), vigour=1.0, pace=1.0, drive=1.0)
     lively = dataclasses.replace(average_person(), tempo=1.4, size=1.3, rate=1.5)
     assert np.abs(habit(average_person(), scene)).max() < 1e-9
     extra = habit(lively, scene)

@@ -6,7 +6,7 @@ import pytest
 from fervor import rotations
 from fervor.skeletons.rig import JOINTS
 from fervor_export.synthetic.motion import synthesise_motion
-from fervor_export.synthetic.sensing import KINDS, continuous, hold, misalign, sense, smooth
+from fervor_export.synthetic.sensing import KINDS, continuous, hold, misalign, respine, roll_in_wrists, sense, smooth
 
 MOTION = synthesise_motion(emotion="joy", intensity=0.8, seconds=6.0, seed=1)[1]
 
@@ -40,6 +40,29 @@ def test_a_misaligned_sensor_turns_the_pose_but_not_how_fast_it_moves() -> None:
     offset = np.degrees(rotations.angle_between(askew, MOTION))
     assert 8.0 < offset.mean() < 50.0
     assert np.allclose(speed(askew), speed(MOTION), atol=1e-6)
+
+
+def test_skeletons_cut_a_spine_in_different_places_and_bend_it_alike() -> None:
+    def thorax(motion: np.ndarray) -> np.ndarray:
+        return rotations.multiply(motion[:, 0], motion[:, 1])
+
+    low, high = respine(MOTION, 0.8), respine(MOTION, 0.3)
+    assert np.degrees(rotations.angle_between(thorax(low), thorax(MOTION))).max() < 1e-4
+    assert np.degrees(rotations.angle_between(thorax(low), thorax(high))).max() < 1e-4
+    bent = [np.degrees(rotations.length(rotations.to_rotvec(motion[:, 0]))).mean() for motion in (low, high)]
+    assert np.isclose(bent[0] / bent[1], 0.8 / 0.3)
+    assert np.array_equal(low[:, 2:], MOTION[:, 2:])
+
+
+def test_a_hand_that_is_turned_in_the_wrist_points_where_the_other_does() -> None:
+    moved = roll_in_wrists(MOTION)
+    for elbow, wrist in ((4, 5), (7, 8)):
+        hands = [rotations.multiply(motion[:, elbow], motion[:, wrist]) for motion in (moved, MOTION)]
+        assert np.degrees(rotations.angle_between(*hands)).max() < 1e-4
+        down = np.array([0.0, -1.0, 0.0])
+        assert np.allclose(rotations.rotate(moved[:, elbow], down), rotations.rotate(MOTION[:, elbow], down))
+        twist = rotations.normalise(moved[:, elbow])[:, 1]
+        assert np.abs(twist).max() < 1e-9
 
 
 def test_a_filter_lags_and_calms() -> None:

@@ -64,7 +64,7 @@ def _frames(script: Script, times: Array) -> _Frames:
     values, unrest = script.manner.over(times), script.unrest  # [frame, channel]
     style = {name: values[:, index] for name, index in INDEX.items()}
     walking = float(script.scene.posture == "walk")
-    pace = script.person.step_hz * style["cadence"] * script.scene.vigour**0.4
+    pace = script.person.step_hz * style["cadence"] * script.scene.vigour**0.4 * script.scene.pace**0.5
     steps = np.concatenate(([0.0], np.cumsum(0.5 * (pace[1:] + pace[:-1]) * np.diff(times))))
     texture = unrest.texture.at(times) * (0.35 + 0.45 * walking + 0.25 * style["sway"])[:, None]
     varied = 0.75 + 0.25 * np.clip(unrest.drift.at(times)[:, 0], -1.5, 1.5)
@@ -102,7 +102,7 @@ def _trunk(frames: _Frames) -> _Trunk:
     level = (
         0.55 * (lean + moved[:, Torso.SPINE.start] + moved[:, Torso.THORAX.start] + 0.2 * scene.pelvis) + 0.25 * slump
     )
-    head += moved[:, Torso.HEAD] + 1.6 * sway[:, 6:9] * style["nod"][:, None] ** 0.5 + 1.6 * fine[:, 2]
+    head += moved[:, Torso.HEAD] + 1.6 * sway[:, 6:9] * (person.nod * style["nod"][:, None]) ** 0.5 + 1.6 * fine[:, 2]
     head[:, 0] += person.head + style["head"] - level - 0.3 * bounce + 1.8 * shake - 0.9 * rock
     head[:, 1] += person.turn[0] + scene.gaze + script.way * style["aside"] - 0.6 * (spine[:, 1] + chest[:, 1])
     head[:, 2] += person.turn[1] + script.way * style["tilt"] - 0.4 * (spine[:, 2] + chest[:, 2])
@@ -195,9 +195,10 @@ def _swing(frames: _Frames) -> Array:
     person, style = frames.script.person, frames.style
     length = person.upper_arm + person.forearm
     wave = frames.walking * gait.arm_swing(frames.phase)  # [frame, 2]
-    amplitude = np.radians(17.0 * style["swing"] * style["stride"] * person.size**0.7)[:, None]
+    swing = style["swing"] * person.size**0.7 * frames.script.scene.drive
+    amplitude = np.radians(np.minimum(20.0 * swing * style["stride"], 65.0))[:, None]
     angle = amplitude * (wave + 0.15 * frames.walking)
-    bent = 0.085 * np.minimum(style["swing"] * person.size, 1.7)[:, None] * np.maximum(wave + 0.6 * frames.walking, 0.0)
+    bent = 0.11 * np.minimum(swing, 2.2)[:, None] * np.maximum(wave + 0.4 * frames.walking, 0.0)
     return np.stack((-0.02 * wave, length * (1.0 - np.cos(angle)) + bent, length * np.sin(angle)), axis=-1)
 
 
@@ -206,11 +207,11 @@ def _legs(frames: _Frames, trunk: _Trunk) -> Array:
     script, style, scene = frames.script, frames.style, frames.script.scene
     raised, bent = np.array(scene.thigh), np.array(scene.knee)
     if frames.walking:
-        raised, bent = gait.legs(frames.phase, style["stride"] * scene.vigour**0.2)
+        raised, bent = gait.legs(frames.phase, 1.1 * style["stride"] * scene.vigour**0.2 * scene.pace)
     elif scene.posture == "stand":
         dip = 1.6 * (style["bounce"] + np.maximum(frames.bounce, -0.6 * style["bounce"]))[:, None]
         raised, bent = raised + dip, bent + 2.0 * dip
-    moved = script.legs.at(frames.times) + (0.3 + 0.6 * frames.walking) * frames.texture[:, 9:13]
+    moved = script.legs.at(frames.times) + (0.3 * scene.feet + 0.6 * frames.walking) * frames.texture[:, 9:13]
     flexion, knee = raised + moved[:, :2], np.clip(bent + moved[:, 2:], 0.0, 140.0)  # [frame, 2]
     spread = np.broadcast_to(np.array(scene.spread) * (1.0, -1.0), flexion.shape)
     # A hanging thigh is spread about the forward axis, a sitting body's about the vertical one.

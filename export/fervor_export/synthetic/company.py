@@ -45,6 +45,10 @@ class Company:
         pitch, yaw, roll = self.rng.normal(0.0, size)
         return float(pitch), float(yaw), float(roll)
 
+    def nodding(self, style: Style) -> float:
+        """How much this head moves, against an average one."""
+        return style["nod"] * self.script.person.nod
+
     # Along with a gesture
 
     def accompany(self, gesture: Gesture, time: float, style: Style, lead: float) -> None:
@@ -61,12 +65,12 @@ class Company:
             head=(down - 0.3 * pitch, way * aside - lead * 5.0 * part, way * tilt),
             shrug=gesture.shrug,
         )
-        step[Torso.HEAD] += self.rng.normal(0.0, 4.0, 3) * style["nod"]
+        step[Torso.HEAD] += self.rng.normal(0.0, 4.0, 3) * self.nodding(style)
         self.trunk.push(time, 0.55 / (style["tempo"] * gesture.pace) ** 0.7, step)
 
     def beat(self, time: float, duration: float, style: Style) -> None:
         """Head and trunk mark a stroke."""
-        force = style["nod"] * float(self.rng.uniform(0.0, 1.0))
+        force = self.nodding(style) * float(self.rng.uniform(0.0, 1.0))
         part = style["trunk"] * style["reach"] ** 0.5
         step = turn(
             spine=self.noise(0.0, 4.0 * part, 1.5 * part),
@@ -122,13 +126,13 @@ class Company:
             style, kind = self.manner.at(time), self.rng.random()
             tempo = style["tempo"] ** 0.6 * self.script.person.tempo
             if kind < 0.35:
-                time = self.nod(time, style["nod"], 0.42 / tempo)
+                time = self.nod(time, self.nodding(style), 0.42 / tempo)
             elif kind < 0.35 + SHAKE.get(self.manner.emotion, 0.1) * style["emblem"]:
                 time = self.shake(time, 0.38 / tempo)
             else:
                 wide = 1.0 + (self.manner.emotion == "fear") * style["emblem"]  # looking about
                 time = self.glance(time, wide, float(self.rng.uniform(0.25, 0.5)) / tempo / wide)
-            time += float(self.rng.exponential(1.6 / style["nod"]))
+            time += float(self.rng.exponential(1.6 / self.nodding(style)))
 
     def nod(self, time: float, size: float, duration: float) -> float:
         """One to three nods; returns when they are over."""
@@ -155,7 +159,7 @@ class Company:
     def shift_weight(self) -> None:
         """Changes of posture every few seconds: the trunk settles anew, a standing body makes a small step."""
         rng, time = self.rng, -float(self.rng.uniform(0.0, 4.0))
-        stands = self.scene.posture == "stand"
+        stands, feet = self.scene.posture == "stand", self.scene.feet
         while time < self.script.seconds:
             style = self.manner.at(time)
             size = (style["sway"] * self.script.person.unrest) ** 0.5
@@ -163,8 +167,8 @@ class Company:
             duration = float(rng.uniform(0.5, 1.4)) / style["tempo"] ** 0.5
             self.trunk.push(time, duration, step - 0.5 * self.settled)
             self.settled = step + 0.5 * self.settled
-            if rng.random() < (0.5 if stands else 0.15):
-                self.step_aside(time, duration, size * (1.0 if stands else 0.3))
+            if rng.random() < (min(0.5 * feet, 0.9) if stands else 0.15):
+                self.step_aside(time, duration, size * (min(feet, 2.0) if stands else 0.3))
             time += float(rng.exponential(3.2)) / size + 0.3
 
     def step_aside(self, time: float, duration: float, size: float) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fervor_export.synthetic.channels import CHANNELS, INDEX, NEUTRAL, SEEN_IN, blend, bounds, distance
-from fervor_export.synthetic.person import Person
+from fervor_export.synthetic.person import USUAL_STEP_HZ, Person
 from fervor_export.synthetic.scene import Scene
 from fervor_export.synthetic.tracks import Array
 
@@ -79,6 +79,8 @@ def habit(person: Person, scene: Scene) -> Array:
     own = {
         "slump": person.slump, "lean": person.lean, "head": person.head, "tempo": person.tempo * scene.vigour,
         "reach": person.size * scene.vigour**0.5, "rate": person.rate * scene.vigour, "sway": person.unrest,
+        "nod": person.nod, "swing": person.size**0.7 * scene.drive, "stride": scene.vigour**0.2 * scene.pace,
+        "cadence": person.step_hz / USUAL_STEP_HZ * scene.vigour**0.4 * scene.pace**0.5,
     }  # fmt: skip
     for name, value in own.items():
         usual[INDEX[name]] = usual[INDEX[name]] * value if CHANNELS[INDEX[name]].ratio else value

@@ -14,6 +14,9 @@ from fervor_export.synthetic.gestures import GESTURES
 
 Array = npt.NDArray[np.float64]
 
+USUAL_STEP_HZ = 0.92
+"""Strides a second of an average walker."""
+
 
 @dataclass(frozen=True, slots=True)
 class Person:
@@ -25,6 +28,7 @@ class Person:
     size: float  # x, habitual size of gestures
     rate: float  # x, habitual number of gestures
     unrest: float  # x, sway
+    nod: float  # x, habitual movement of the head
     bimanual: float  # 0..1, readiness to use both hands
     upper_arm: float
     forearm: float
@@ -50,10 +54,11 @@ class Person:
             size=float(np.exp(rng.normal(0.0, 0.24))),
             rate=float(np.exp(rng.normal(0.0, 0.35))),
             unrest=float(np.exp(rng.normal(0.0, 0.3))),
+            nod=float(np.exp(rng.normal(0.0, 0.3))),
             bimanual=float(rng.beta(2.5, 2.5)),
             upper_arm=float(rng.normal(0.30, 0.012)),
             forearm=float(rng.normal(0.26, 0.01)),
-            hang=float(rng.uniform(0.97, 1.04)),
+            hang=float(rng.uniform(0.96, 1.06)),
             arm_out=float(rng.uniform(0.02, 0.09)),
             slump=float(rng.normal(2.0, 6.0)),
             lean=float(rng.normal(0.0, 4.0)),
@@ -61,7 +66,7 @@ class Person:
             turn=rng.normal(0.0, 3.0, 2),
             elbows=float(rng.normal(18.0, 9.0)),
             breath_hz=float(rng.uniform(0.2, 0.36)),
-            step_hz=float(rng.normal(0.92, 0.06)),
+            step_hz=float(rng.normal(USUAL_STEP_HZ, 0.06)),
             idiom=np.clip(rng.normal(0.0, 1.0, len(CHANNELS)), -2.0, 2.0),
             taste={gesture: float(np.exp(rng.normal(0.0, 0.7))) for gesture in GESTURES},
         )

@@ -15,7 +15,7 @@ K = TypeVar("K", bound=str)
 Posture = Literal["sit", "stand", "walk"]
 Activity = Literal["talk", "act", "task", "dance", "listen"]
 
-POSTURES: dict[Posture, float] = {"stand": 0.46, "sit": 0.34, "walk": 0.20}
+POSTURES: dict[Posture, float] = {"stand": 0.42, "sit": 0.40, "walk": 0.18}
 ACTIVITIES: dict[Posture, dict[Activity, float]] = {
     "stand": {"talk": 0.38, "act": 0.30, "task": 0.12, "dance": 0.08, "listen": 0.12},
     "sit": {"talk": 0.50, "act": 0.28, "task": 0.08, "dance": 0.0, "listen": 0.14},
@@ -46,6 +46,9 @@ class Scene:
     knee: tuple[float, float]  # left, right
     rest: float  # drawn in 0..1: which resting pose
     gaze: float  # head yaw towards the partner
+    pace: float  # x, how fast and far a walker steps
+    drive: float  # x, how far a walker's arms swing
+    feet: float  # x, how restless standing feet are
 
     @classmethod
     def draw(
@@ -62,9 +65,11 @@ class Scene:
             legs = rng.normal(3.0, 3.0, 2), rng.normal(4.0, 2.5, 2), np.abs(rng.normal(5.0, 4.0, 2))
             pelvis = float(rng.normal(0.0, 5.0))
         thigh_pair, spread_pair, knee_pair = ((float(pair[0]), float(pair[1])) for pair in legs)
+        pace, drive, feet = np.exp(rng.normal(0.0, (0.18, 0.35, 0.6))).tolist()
         return cls(
-            posture, activity, float(np.exp(rng.normal(0.0, 0.2))), pelvis, thigh_pair, spread_pair, knee_pair,
+            posture, activity, float(np.exp(rng.normal(0.0, 0.25))), pelvis, thigh_pair, spread_pair, knee_pair,
             float(rng.random()), float(rng.normal(0.0, 8.0)),
+            pace, pace * drive, feet,
         )  # fmt: skip
 
     def seen(self) -> dict[str, float]:

@@ -22,6 +22,10 @@ KINDS: dict[Kind, float] = {"optical": 0.30, "suit": 0.30, "depth": 0.24, "landm
 """How often each kind of sensor is drawn."""
 
 
+SPINE_SHARE = (0.25, 0.85)
+"""What part of a bent trunk a skeleton's lower joint has: they cut spines in different places."""
+
+
 @dataclass(frozen=True, slots=True)
 class Quality:
     """Ranges from which a sensor's flaws are drawn, in degrees unless said otherwise."""
@@ -65,15 +69,35 @@ def sense(rng: np.random.Generator, motion: Array, kind: Kind | None = None) -> 
     kinds = list(KINDS)
     kind = kind or kinds[int(rng.choice(len(kinds), p=list(KINDS.values())))]
     quality = QUALITY[kind]
-    seen = motion
+    seen = respine(motion, rng.uniform(*SPINE_SHARE)) if rng.random() < 0.3 else motion
     if kind == "landmarks":
         seen = _without_roll(seen)
+    elif rng.random() < 0.25:
+        seen = roll_in_wrists(seen)
     if rng.random() < quality.offset_share:
         seen = misalign(seen, rng, rng.uniform(*quality.offset))
     seen = smooth(seen, rng.uniform(*quality.lag))
     seen = _shake(seen, rng, rng.uniform(*quality.jitter), rng.uniform(*quality.drift))
     mask = _lose(rng, len(seen), quality)
     return hold(_freeze(seen, rng) if rng.random() < 0.04 else seen, mask), mask
+
+
+def respine(motion: Array, share: float) -> Array:
+    """The motion of a skeleton that bends a share of the whole trunk in its lower, the rest in its upper joint."""
+    out = motion.copy()
+    whole = rotations.multiply(motion[:, 0], motion[:, 1])  # [frame, 4] pelvis to thorax
+    out[:, 0] = rotations.from_rotvec(share * rotations.to_rotvec(whole))
+    out[:, 1] = rotations.multiply(rotations.conjugate(out[:, 0]), whole)
+    return out
+
+
+def roll_in_wrists(motion: Array) -> Array:
+    """Pronation as a turn of the hand instead of the forearm: skeletons differ in where they have it."""
+    out = _without_roll(motion)
+    for elbow, wrist in zip(_ELBOWS, _WRISTS, strict=True):
+        twist = rotations.multiply(rotations.conjugate(out[:, elbow]), motion[:, elbow])
+        out[:, wrist] = rotations.multiply(twist, motion[:, wrist])
+    return out
 
 
 def misalign(motion: Array, rng: np.random.Generator, degrees: float) -> Array:
