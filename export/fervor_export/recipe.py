@@ -86,7 +86,9 @@ DEFAULT = Recipe(
     head="gated",  # each emotion reads the descriptor its own way
     optimizer="adamw",
     learning_rate=4e-3,
-    weight_decay=1e-2,
+    # With 1e-2 (9000 clips, 10 epochs, seed 0) rounding grew until torch and onnxruntime differed by 4.5e-5, and the
+    # model file was refused; r within emotion is about the same (validation 0.500 instead of 0.507).
+    weight_decay=5e-2,
     epochs=14,  # of many clips: more clips do more than more epochs
     batch_size=64,
     loss_at="frames",  # a live body is asked at every frame, not at a clip's end
