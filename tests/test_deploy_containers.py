@@ -26,12 +26,12 @@ from containers import (
     running_docker,
     which,
 )
+from crowd import Robots, assert_told_as_if_nothing_had_happened
 from fervor.cli.local import free_port
 from fervor.settings import MIB
 from live import PROTOCOL, Live, frames_of
 from pages import ROOT
 from program import write_bvh
-from robots import Robots, assert_told_as_if_nothing_had_happened
 from waiting import until
 
 MOST_MB = 220

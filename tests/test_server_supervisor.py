@@ -8,12 +8,12 @@ import httpx
 import pytest
 import websockets
 
+from crowd import Robots, assert_told_as_if_nothing_had_happened
 from fervor.model import default_model_path
 from fervor.server.supervisor import with_key
 from fervor.settings import Settings
 from live import PROTOCOL, Live
 from program import fervor
-from robots import Robots, assert_told_as_if_nothing_had_happened
 from waiting import until
 from workers import is_alive, served
 
