@@ -9,6 +9,7 @@ COPY constraints.txt pyproject.toml README.md LICENSE ./
 COPY service service
 COPY export export
 COPY clients/python clients/python
+COPY clients/pepper clients/pepper
 COPY bench/fervor_bench bench/fervor_bench
 # Compiled here once: the container can't write, and a replica that comes back should not spend its start on it.
 RUN python -m pip --python /opt/fervor/bin/python install --no-cache-dir --disable-pip-version-check \
