@@ -22,10 +22,10 @@ OURS = tuple(
     for name in ("serve", "stream", "score", "convert", "calibrate", "inspect", "demo")
 )
 
-OWN_PACKAGES = frozenset({"fervor", "fervor_client", "fervor_export", "fervor_bench"})
+OWN_PACKAGES = frozenset({"fervor", "fervor_client", "fervor_export", "fervor_bench", "fervor_pepper"})
 """A module missing from one of these is a fault of ours, not an extra that is not installed."""
 
-EXTRAS = {"fervor": "serve", "fervor_export": "train", "fervor_bench": "bench"}
+EXTRAS = {"fervor": "serve", "fervor_export": "train", "fervor_bench": "bench", "fervor_pepper": "study"}
 """The extra that brings what a package of ours needs."""
 
 ANYTHING = {"allow_extra_args": True, "ignore_unknown_options": True}
