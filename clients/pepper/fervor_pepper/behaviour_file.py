@@ -1,6 +1,7 @@
 """Behaviour files: YAML that a user edits, read with errors that name the line and the key."""
 
 from collections.abc import Sequence
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -34,6 +35,7 @@ class _NoDuplicates(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+@cache
 def default_behaviour() -> Behaviour:
     """The behaviour that comes with the package: the paper's lines, in English unless told otherwise."""
     return parse_behaviour(default_text(), DEFAULT)

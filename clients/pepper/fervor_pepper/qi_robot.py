@@ -77,7 +77,8 @@ class Pepper:
         finally:
             if act.leds is not None:
                 self._aside("ALLeds", "reset", EYES)
-        self._aside("ALMemory", "raiseEvent", EVENT, [act.emotion or "", act.level or "", act.say or "", gesture or ""])
+        told = [str(word or "") for word in (act.emotion, act.level, act.say, gesture)]  # qi knows no StrEnum
+        self._aside("ALMemory", "raiseEvent", EVENT, told)
         return gesture
 
     def stop(self) -> None:
@@ -203,10 +204,11 @@ class Pepper:
         future.addCallback(lambda _: over.set())
         over.wait()
         if self._stopped and not future.isFinished():
-            future.cancel()
             self._aside("ALTextToSpeech", "stopAll")
             self._aside("ALAnimationPlayer", "stopAll")
             future.wait(round(STOP_S * 1000))
+            self._result(what, future)
+            raise RobotError(f"the robot at {self.url} was stopped while it was to {what}")
         self._result(what, future)
 
     def _send(self, what: str, method: Callable[..., Any], *arguments: object) -> Any:
