@@ -90,8 +90,8 @@ def run(  # noqa: PLR0917  # typer calls it by name
         return
     chosen = _behaviour(behaviour, language)
     source = _source(play_file, skeleton, loop=loop)
-    recorder = SessionLog(log, participant=participant, condition=condition or mode) if log else None
     with (
+        _recorder(log, participant, condition or mode) as recorder,
         _robot(robot, dry_run=dry_run) as body,
         sync.connect(
             service, skeleton=source.skeleton, emotion=emotion, token=token, on_error=Complaints(), retry_for=None
@@ -123,6 +123,15 @@ def _source(path: Path | None, skeleton: str | None, *, loop: bool) -> Source:
         raise InputError("nothing to answer to; expected --play FILE, or frames on standard input")
     known = find_skeleton(skeleton) or "c13"
     return Source(SkeletonSpec.of(known) if isinstance(known, Skeleton) else known, None, loop=False)
+
+
+@contextlib.contextmanager
+def _recorder(path: Path | None, participant: str, condition: str) -> Iterator[SessionLog | None]:
+    if path is None:
+        yield None
+        return
+    with contextlib.closing(SessionLog(path, participant=participant, condition=condition)) as log:
+        yield log
 
 
 @contextlib.contextmanager

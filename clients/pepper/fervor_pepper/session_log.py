@@ -74,12 +74,19 @@ class Appender:
             if head is not None and head != columns:
                 raise DataError(f"{path}: has the columns {', '.join(head)}; expected {', '.join(columns)}")
             self._file = path.open("ab", buffering=0)
+            self._begin(columns if head is None else None, whole=whole)
         except OSError as error:
             raise DataError(f"{path}: can't be written: {error.strerror or error}") from None
-        if not whole:
-            self._file.write(b"\n")
-        if head is None:
-            self.append(columns)
+
+    def _begin(self, head: tuple[str, ...] | None, *, whole: bool) -> None:
+        try:
+            if not whole:
+                self._file.write(b"\n")
+            if head is not None:
+                self.append(head)
+        except OSError:
+            self.close()
+            raise
 
     def append(self, cells: tuple[object, ...]) -> None:
         """Add a row, in one write."""
@@ -158,6 +165,10 @@ class SessionLog:
     def end(self) -> None:
         """The session is over."""
         self._write("end")
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file; nothing more is recorded."""
         if self._rows is not None:
             self._rows.close()
             self._rows = None
@@ -178,7 +189,7 @@ class SessionLog:
             self._rows.append(tuple(told.get(column, "") for column in COLUMNS))
         except OSError as error:
             logger.warning("%s: can't be written any more: %s", self._rows.path, error.strerror or error)
-            self._rows = None
+            self.close()
 
 
 def _look(path: Path) -> tuple[tuple[str, ...] | None, bool]:
