@@ -1,8 +1,4 @@
-"""A robot for tests: real qi services in a process of their own, which tell what they were told.
-
-Run as a program it is that robot: it listens on a port, answers as its options say, and prints a line of JSON a call.
-It ends when its standard input does.
-"""
+"""A robot for tests: real qi services in a process of their own (qi_services.py), which tell what they were told."""
 
 import importlib.util
 import json
@@ -13,12 +9,14 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Self
 
 import pytest
+
+PROGRAM = Path(__file__).with_name("qi_services.py")
 
 HAPPY = "animations/Stand/Emotions/Positive/Happy_4"
 SERVICES = (
@@ -60,7 +58,7 @@ class QiRobot:
 
     def start(self) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, __file__, str(self.port), json.dumps(self._options)],
+            [sys.executable, str(PROGRAM), str(self.port), json.dumps(self._options)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -128,106 +126,3 @@ class QiRobot:
             if line.startswith("["):
                 with suppress(ValueError):  # a line of qi's own log
                     self._calls.put(json.loads(line))
-
-
-# --- the robot's own process ------------------------------------------------------------------------------------------
-
-
-def tell(*what: object) -> None:
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
-
-
-def serve(port: int, options: dict[str, Any]) -> None:
-    import qi
-
-    known = set(options["animations"])
-    busy = threading.Event()
-
-    def work() -> None:
-        busy.clear()
-        busy.wait(options["seconds"])
-
-    @qi.multiThreaded()  # as on the robot: it can be stopped while it speaks
-    class Speech:
-        def say(self, text: str) -> None:
-            tell("ALTextToSpeech", "say", text)
-            if "unspeakable" in text:
-                raise RuntimeError("no voice\nfor this")
-            work()
-            tell("ALTextToSpeech", "said", text)
-
-    @qi.multiThreaded()
-    class FullSpeech(Speech):
-        def setLanguage(self, name: str) -> None:
-            tell("ALTextToSpeech", "setLanguage", name)
-            if name == "Klingon":
-                raise RuntimeError("language is not installed")
-
-        def stopAll(self) -> None:
-            tell("ALTextToSpeech", "stopAll")
-            busy.set()
-
-    @qi.multiThreaded()
-    class Animated:
-        def say(self, text: str) -> None:
-            tell("ALAnimatedSpeech", "say", text)
-            work()
-
-    @qi.multiThreaded()
-    class Player:
-        def run(self, name: str) -> None:
-            tell("ALAnimationPlayer", "run", name)
-            if name not in known:
-                raise RuntimeError(f"animation {name} does not exist")
-            work()
-            tell("ALAnimationPlayer", "ran", name)
-
-    class Manager:
-        def getInstalledBehaviors(self) -> list[str]:
-            return sorted(known)
-
-    class Leds:
-        def fadeRGB(self, group: str, colour: int, seconds: float) -> None:
-            tell("ALLeds", "fadeRGB", group, colour, seconds)
-
-        def reset(self, group: str) -> None:
-            tell("ALLeds", "reset", group)
-
-    class Memory:
-        def raiseEvent(self, name: str, value: list[str]) -> None:
-            tell("ALMemory", "raiseEvent", name, list(value))
-
-    made = {
-        "ALTextToSpeech": Speech if options["bare"] else FullSpeech,
-        "ALAnimatedSpeech": Animated,
-        "ALAnimationPlayer": Player,
-        "ALBehaviorManager": Manager,
-        "ALLeds": Leds,
-        "ALMemory": Memory,
-    }
-    qi.logging.setLevel(qi.logging.FATAL)
-    session = qi.Session()
-    _listen(session, f"tcp://127.0.0.1:{port}")
-    kept = [made[name]() for name in options["services"]]
-    for name, service in zip(options["services"], kept, strict=True):
-        session.registerService(name, service)
-    tell("up")
-    sys.stdin.read()
-    os._exit(0)  # qi's own threads would delay the end
-
-
-def _listen(session: Any, url: str) -> None:
-    """The port of a robot that was killed is free again only after a while."""
-    for _ in range(300):
-        try:
-            session.listenStandalone(url)
-        except RuntimeError:
-            time.sleep(0.1)
-        else:
-            return
-    sys.exit(f"can't listen on {url}")
-
-
-if __name__ == "__main__":
-    serve(int(sys.argv[1]), json.loads(sys.argv[2]))

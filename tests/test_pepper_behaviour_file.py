@@ -6,7 +6,13 @@ import pytest
 
 from fervor.errors import InputError
 from fervor.levels import Level
-from fervor_pepper.behaviour_file import BehaviourError, default_behaviour, default_text, parse_behaviour, read_behaviour
+from fervor_pepper.behaviour_file import (
+    BehaviourError,
+    default_behaviour,
+    default_text,
+    parse_behaviour,
+    read_behaviour,
+)
 
 PAPER = {"joy": "you look so happy!", "surprise": "why are you surprised?", "sadness": "what happened to you?"}
 
@@ -57,7 +63,11 @@ WRONG = [
     ("rest_s: 2", "pause_s: 2", "timing.pause_s is not a key of behaviours"),
     ("  joy:\n    weak: {say", "  glee:\n    weak: {say", "reactions.glee.*emotion 'glee' is not known"),
     ("surprise:\n    weak: {say", "surprise:\n    mild: {say", "reactions.surprise.mild.*'weak' or 'strong'"),
-    ("weak: {say: true}", "weak: {say: true, leds: yellow}", "leds: expected a colour like '#ffcc00', in quotes, but 'yellow' came"),
+    (
+        "weak: {say: true}",
+        "weak: {say: true, leds: yellow}",
+        "leds: expected a colour like '#ffcc00', in quotes, but 'yellow' came",
+    ),
     ("to: intense", "to: nearest", "attention.to: input should be 'intense' or 'longest'"),
     ("least_s: 6", "least_s: 60", r"fillers: least_s \(60\) must not exceed most_s \(14\)"),
     ('["oh", "hmm", "uh-huh", "I see", "well"]', "[]", "languages.en.fillers"),

@@ -4,6 +4,7 @@ import csv
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def test_the_sample_is_answered_by_speech_then_a_gesture_then_speech(
     levels = [act.level for act in robot.acts]
     assert levels[0] == "weak"
     assert "strong" in levels
-    assert all(a != b for a, b in zip(levels, levels[1:], strict=False))
+    assert all(a != b for a, b in pairwise(levels))
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["kind"] for row in (rows[0], rows[-1])] == ["begin", "end"]

@@ -1,5 +1,6 @@
 """The behaviour core: one act at a time, pauses kept, and fillers that no estimate can move."""
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -54,7 +55,7 @@ def play(stage: Show, events: list[tuple[float, Any]]) -> list[tuple[float, floa
 def test_acts_never_overlap_and_rests_are_kept(events: list[tuple[float, Any]]) -> None:
     stage = show(behaviour(timing=TIMING))
     spans = play(stage, events)
-    for (began, ended), (following, _) in zip(spans, spans[1:], strict=False):
+    for (began, ended), (following, _) in pairwise(spans):
         # An act that nobody ended is given up after its timeout and the time to stop.
         least = began + TIMING.act_timeout_s + STOP_S if ended is None else ended
         assert following >= least + TIMING.rest_s
@@ -119,10 +120,10 @@ def test_fillers_keep_to_their_rate_and_do_not_repeat(seed: int) -> None:
         stage.wait(0.1)
         if stage.performer.phase is Phase.ACTING:
             stage.end()
-    pauses = [after - before for (before, _), (after, _) in zip(stage.acts, stage.acts[1:], strict=False)]
+    pauses = [after - before for (before, _), (after, _) in pairwise(stage.acts)]
     assert min(pauses) >= 4.0 - 0.11
     assert max(pauses) <= 9.0 + 0.11
-    assert all(a != b for a, b in zip(stage.said, stage.said[1:], strict=False))
+    assert all(a != b for a, b in pairwise(stage.said))
     assert set(stage.said) <= set(behaviour().words.fillers)
 
 
@@ -189,5 +190,5 @@ def test_an_act_that_never_reached_the_robot_is_owed_again_at_once() -> None:
 
 def test_the_table_lets_acts_begin_from_rest_alone() -> None:
     assert {before for (before, _), after in TRANSITIONS.items() if after is Phase.ACTING} == {Phase.IDLE}
-    reached = {after for after in TRANSITIONS.values()} | {Phase.IDLE}
+    reached = set(TRANSITIONS.values()) | {Phase.IDLE}
     assert reached == set(Phase) == {before for before, _ in TRANSITIONS}

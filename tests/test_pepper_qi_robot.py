@@ -89,11 +89,13 @@ def test_it_knows_what_it_can_play_and_plays_it(robot: QiRobot, pepper: Pepper) 
 
 def test_speech_and_gesture_together_are_animated_speech(robot: QiRobot, pepper: Pepper) -> None:
     assert pepper.perform(act(say="hello!", gestures=(HAPPY,))) == HAPPY
-    assert ["ALAnimatedSpeech", "say", f"^start({HAPPY}) hello! ^wait({HAPPY})"] in list(robot.calls_until("raiseEvent"))
+    assert ["ALAnimatedSpeech", "say", f"^start({HAPPY}) hello! ^wait({HAPPY})"] in list(
+        robot.calls_until("raiseEvent")
+    )
 
 
 def test_errors_are_one_sentence_and_the_next_act_works(robot: QiRobot, pepper: Pepper) -> None:
-    with pytest.raises(RobotError, match="could not say 'unspeakable': .*no voice for this") as caught:
+    with pytest.raises(RobotError, match=r"could not say 'unspeakable': .*no voice for this") as caught:
         pepper.perform(act(say="unspeakable"))
     assert "\n" not in caught.value.message
     assert not isinstance(caught.value, RobotAway)
@@ -124,7 +126,7 @@ def test_a_robot_with_two_services_and_few_methods_will_do() -> None:
             ["ALAnimationPlayer", "run", HAPPY],
             ["ALAnimationPlayer", "ran", HAPPY],
         ]
-        with pytest.raises(RobotError, match="could not play animations/none: .*does not exist"):
+        with pytest.raises(RobotError, match=r"could not play animations/none: .*does not exist"):
             pepper.perform(act(gestures=("animations/none",)))
 
 
@@ -189,5 +191,5 @@ def test_nobody_there_is_told_and_tried_again(caplog: pytest.LogCaptureFixture) 
 
 @pytest.mark.parametrize("url", ["pepper.local", "http://127.0.0.1:9559", "127.0.0.1:9559"])
 def test_an_address_that_is_none(url: str) -> None:
-    with pytest.raises(InputError, match="expected one like tcp://pepper.local:9559"):
+    with pytest.raises(InputError, match=r"expected one like tcp://pepper\.local:9559"):
         Pepper(url)

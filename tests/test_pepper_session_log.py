@@ -113,9 +113,10 @@ def test_a_full_disk_ends_the_log_and_not_the_session(tmp_path: Path, caplog: py
     written.begin("")
     assert written._rows is not None
     written._rows.close()
-    written._rows._file = Path("/dev/full").open("ab", buffering=0)  # the disk is full from now on
-    written.left("7")
-    written.left("8")
+    with Path("/dev/full").open("ab", buffering=0) as full:
+        written._rows._file = full  # the disk is full from now on
+        written.left("7")
+        written.left("8")
     assert caplog.text.count("can't be written any more: No space left") == 1
 
 

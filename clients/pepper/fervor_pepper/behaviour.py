@@ -15,6 +15,7 @@ from pydantic import (
     Field,
     StringConstraints,
     ValidationError,
+    WithJsonSchema,
     model_validator,
 )
 
@@ -31,6 +32,7 @@ Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max
 """Something to say."""
 
 Seconds = Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)]
+SomeSeconds = Annotated[float, Field(gt=0, le=600, allow_inf_nan=False)]
 
 
 def _colour(value: object) -> object:
@@ -46,7 +48,7 @@ def _emotion(value: str) -> str:
         raise ValueError(error.message) from None
 
 
-Colour = Annotated[int, BeforeValidator(_colour)]
+Colour = Annotated[int, BeforeValidator(_colour), WithJsonSchema({"type": "string"})]
 EmotionName = Annotated[str, AfterValidator(_emotion)]
 
 
@@ -76,7 +78,7 @@ class Fillers(_Part):
     """How often mode `none` speaks: the pause between two fillers is drawn evenly from this range."""
 
     least_s: Seconds = Field(6.0, description="shortest time from one filler to the next")
-    most_s: Seconds = Field(14.0, gt=0, description="longest time from one filler to the next")
+    most_s: SomeSeconds = Field(14.0, description="longest time from one filler to the next")
 
     @model_validator(mode="after")
     def _in_order(self) -> "Fillers":
@@ -91,7 +93,7 @@ class Timing(_Part):
     settle_s: Seconds = Field(0.5, description="an emotion and level must be shown so long before they count")
     rest_s: Seconds = Field(2.0, description="pause after any act")
     emotion_rest_s: Seconds = Field(6.0, description="pause after an act for the same emotion, whoever shows it")
-    act_timeout_s: Seconds = Field(15.0, gt=0, description="an act that takes longer is stopped")
+    act_timeout_s: SomeSeconds = Field(15.0, description="an act that takes longer is stopped")
 
 
 class Attention(_Part):
@@ -101,7 +103,7 @@ class Attention(_Part):
         "intense", description="`intense`: who shows most; `longest`: who has been there longest"
     )
     hold_s: Seconds = Field(5.0, description="it stays with a person at least so long")
-    lost_s: Seconds = Field(2.0, gt=0, description="a person unseen so long is gone, and new when back")
+    lost_s: SomeSeconds = Field(2.0, description="a person unseen so long is gone, and new when back")
 
 
 class Behaviour(_Part):
@@ -112,9 +114,9 @@ class Behaviour(_Part):
     reactions: Mapping[EmotionName, Mapping[Level, Reaction]] = Field(
         description="what to do: emotion, level; what is not listed gets no reaction"
     )
-    fillers: Fillers = Fillers()
-    timing: Timing = Timing()
-    attention: Attention = Attention()
+    fillers: Fillers = Field(default_factory=Fillers, description="how often mode `none` speaks")
+    timing: Timing = Field(default_factory=Timing, description="when mode `expressive` reacts")
+    attention: Attention = Field(default_factory=Attention, description="whom it answers where there are several")
 
     @model_validator(mode="after")
     def _words_for_every_reaction(self) -> "Behaviour":
