@@ -27,6 +27,7 @@ from pydantic import TypeAdapter
 from fervor.cli.commands import build_app
 from fervor.cli.main import run as run_fervor
 from fervor.protocol.messages import ClientMessage, ServerMessage
+from fervor_pepper.program import app as pepper
 from live import Live
 from pages import DOCS, PAGES, ROOT, Block, blocks, headings, read
 
@@ -96,6 +97,8 @@ def run_command(command: list[str], live: Live, where: str) -> None:
     match program:
         case "fervor":
             run_or_parse(arguments, live, where)
+        case "fervor-pepper":
+            run_pepper(arguments)
         case "curl":
             run_curl(arguments, where)
         case "docker":  # too slow to run here: the file it reads must know what is asked of it
@@ -151,6 +154,19 @@ def parse(arguments: list[str]) -> None:
         name, command, rest = group.resolve_command(context, [*context._protected_args, *context.args])
         assert command is not None
         command.make_context(name, rest, parent=context)
+
+
+def run_pepper(arguments: list[str]) -> None:
+    """Dry runs for real; what needs a robot is only parsed. `> FILE` is where the output goes."""
+    arguments, target = (arguments[:-2], arguments[-1]) if ">" in arguments else (arguments, None)
+    command = typer.main.get_command(pepper)
+    if target is None and "--dry-run" not in arguments:
+        command.make_context("fervor-pepper", list(arguments))
+        return
+    with redirect_stdout(io.StringIO()) as out:
+        command.main(list(arguments), prog_name="fervor-pepper", standalone_mode=False)
+    if target is not None:
+        Path(target).write_text(out.getvalue(), encoding="utf-8")
 
 
 def run_curl(arguments: list[str], where: str) -> None:
