@@ -1,11 +1,9 @@
 """Behaviour files: YAML that a user edits, read with errors that name the line and the key."""
 
-from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-import yaml
 from pydantic import ValidationError
 
 from fervor.errors import InputError
@@ -20,19 +18,6 @@ class BehaviourError(InputError):
     """A behaviour file that can't be used."""
 
     code = "bad_behaviour"
-
-
-class _NoDuplicates(yaml.SafeLoader):
-    """Refuses a key that stands twice in one mapping; YAML forbids it, and PyYAML would drop the first."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[object, object]:
-        seen: set[object] = set()
-        for key, _ in node.value:
-            name = self.construct_object(key, deep=True)
-            if name in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"{name} stands here twice", key.start_mark)
-            seen.add(name)
-        return super().construct_mapping(node, deep)
 
 
 @cache
@@ -67,37 +52,16 @@ def parse_behaviour(text: str, name: str) -> Behaviour:
     Raises:
         BehaviourError: the text is no YAML, or says something that behaviours don't have.
     """
+    from fervor_pepper.yaml_text import NotYaml, load  # PyYAML comes with the extra; the core does without
+
     try:
-        root = yaml.compose(text, Loader=_NoDuplicates)
-        said = yaml.load(text, Loader=_NoDuplicates)  # noqa: S506  # a SafeLoader
-    except yaml.MarkedYAMLError as error:
-        place = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise BehaviourError(f"{name}{place}: not YAML: {error.problem or error.context}") from None
-    except (yaml.YAMLError, ValueError, TypeError) as error:
-        raise BehaviourError(f"{name}: not YAML: {str(error).splitlines()[0]}") from None
+        document = load(text)
+    except NotYaml as error:
+        place = "" if error.line is None else f", line {error.line}"
+        raise BehaviourError(f"{name}{place}: not YAML: {error}") from None
     try:
-        return Behaviour.model_validate(said)
+        return Behaviour.model_validate(document.content)
     except ValidationError as error:
-        line = _line(root, error.errors()[0]["loc"])
+        line = document.line(error.errors()[0]["loc"])
         sentence = one_sentence(error).replace("a field of this message", "a key of behaviours")
         raise BehaviourError(f"{name}, line {line}: {sentence.replace('the message', 'the file')}") from None
-
-
-def _line(node: yaml.Node | None, loc: Sequence[int | str]) -> int:
-    """The line, from 1, of the innermost node on the way to what a complaint is about."""
-    line = 1
-    for step in loc:
-        found = _child(node, step)  # None: pydantic's own names of validators are steps too
-        line, node = found or (line, node)
-    return line
-
-
-def _child(node: yaml.Node | None, step: int | str) -> tuple[int, yaml.Node] | None:
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            if key.value == str(step):
-                return key.start_mark.line + 1, value
-    if isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
-        child = node.value[step]
-        return child.start_mark.line + 1, child
-    return None
