@@ -87,6 +87,11 @@ def test_it_knows_what_it_can_play_and_plays_it(robot: QiRobot, pepper: Pepper) 
     assert ["ALLeds", "reset", "FaceLeds"] in told
 
 
+def test_lights_alone_are_an_act(robot: QiRobot, pepper: Pepper) -> None:
+    assert pepper.perform(act(leds=0xFF)) is None
+    assert [call[1] for call in robot.calls_until("raiseEvent")] == ["fadeRGB", "reset", "raiseEvent"]
+
+
 def test_speech_and_gesture_together_are_animated_speech(robot: QiRobot, pepper: Pepper) -> None:
     assert pepper.perform(act(say="hello!", gestures=(HAPPY,))) == HAPPY
     assert ["ALAnimatedSpeech", "say", f"^start({HAPPY}) hello! ^wait({HAPPY})"] in list(

@@ -103,7 +103,8 @@ class Pepper:
 
     def _speak_and_move(self, act: Act) -> str | None:
         if not act.gestures:
-            self._speak(act)
+            if act.say:
+                self._speak(act)
             return None
         animated = self._service("ALAnimatedSpeech") if act.say else None
         if animated is not None:
