@@ -6,6 +6,7 @@ import logging
 import sys
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -13,7 +14,7 @@ import websockets
 
 from bodies import motion
 from fervor.server.logs import JsonFormatter, TextFormatter, leave_out_query
-from live import PROTOCOL, frames_of
+from live import PROTOCOL, RawClient, frames_of
 from program import start_fervor
 
 
@@ -126,3 +127,14 @@ async def test_sessions_leave_lines_that_programs_can_read(tmp_path: Path) -> No
     assert (ended["session"], ended["client"], ended["reason"]) == (begun["session"], "pepper", "ended")
     assert ended["totals"]["estimates"] == 3
     assert any(line["logger"] == "uvicorn.error" for line in lines)
+
+
+@pytest.mark.parametrize("log_format", ["json", "text"])
+def test_text_that_is_no_utf8_leaves_one_line(log_format: str, tmp_path: Path) -> None:
+    with logging_service(tmp_path, "--log-format", log_format) as (address, heard):
+        client = RawClient(SimpleNamespace(address=address))
+        with client.socket:
+            client.send(b"\xff\xfe")
+            assert client.read_until(b"\x03\xef").endswith(b"\x88\x02\x03\xef")  # closed with 1007
+    assert sum("UTF-8" in line for line in heard) == 1
+    assert not any("Traceback" in line or "UnicodeDecodeError" in line for line in heard)

@@ -56,10 +56,18 @@ def configure_logs(log_format: LogFormat, level: LogLevel) -> None:
     logging.basicConfig(level=level.upper(), handlers=[handler])
     for name in QUERY_LOGGERS:
         logging.getLogger(name).addFilter(leave_out_query)
+    logging.getLogger("uvicorn.error").addFilter(shorten_bad_text)
 
 
 def leave_out_query(record: logging.LogRecord) -> bool:
     """Cut the query off every address in a line of uvicorn's."""
     if isinstance(record.args, tuple):
         record.args = tuple(arg.partition("?")[0] if isinstance(arg, str) else arg for arg in record.args)
+    return True
+
+
+def shorten_bad_text(record: logging.LogRecord) -> bool:
+    """Make one line of a client's text that is not UTF-8: uvicorn logs it as an error of its own, with a trace."""
+    if record.exc_info and isinstance(record.exc_info[1], UnicodeDecodeError) and "Invalid UTF-8" in record.msg:
+        record.exc_info, record.levelno, record.levelname = None, logging.WARNING, "WARNING"
     return True
