@@ -266,6 +266,17 @@ def test_a_calibration_follows_its_last_frame_and_is_followed_by_checkpoints():
     assert [(body.body, body.seq) for body in started.resumed] == [("eve", 11), ("bob", 1)]
 
 
+def test_a_calibration_inside_a_message_is_followed_by_checkpoints_of_all_its_frames():
+    replica = Replica()
+    replica.say(SessionStart(skeleton="kinect_v2", checkpoint_s=60.0))
+    run(replica, [still(0), still(1, body="bob")])
+    replica.say(SessionCalibrate(body="eve", seconds=0.3))
+    said = replica.say(Frames(frames=(*(still(seq) for seq in range(2, 20)), still(20, body="bob"))))
+    assert kinds(said) == ["estimates", "session.calibrated", "checkpoint", "checkpoint"]
+    assert said[1].frames < 18, "it was over before the message was"
+    assert {message.body: message.seq for message in said[-2:]} == {"eve": 19, "bob": 20}
+
+
 def test_a_calibration_ends_with_its_body():
     replica = Replica()
     replica.say(SessionStart(skeleton="kinect_v2"))

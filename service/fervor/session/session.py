@@ -293,8 +293,10 @@ class Session:
         most = self._host.limits.max_frames_per_message
         if len(message.frames) > most:
             raise FrameError(f"a message has {len(message.frames)} frames; this service takes at most {most}")
-        group = self._groups.open()
+        group, agreement = self._groups.open(), self._agreement
         events = [event for place, frame in enumerate(message.frames) for event in self._frame(frame, group, place)]
+        if self._agreement is not agreement:  # calibrated: the rest of the message is answered before that is told
+            events += self.checkpoints(group)
         return events + self._close_group(group)
 
     def _close_group(self, group: int) -> list[Event]:
@@ -342,11 +344,15 @@ class Session:
         return self._tell_calibrated(ticket, message)
 
     def _tell_calibrated(self, ticket: Ticket, message: SessionCalibrated) -> list[Event]:
-        """Once its last frame is answered, in one go with checkpoints under the new terms: the old ones are void."""
+        """Once its last frame is answered, in one go with checkpoints under the new terms: the old ones are void.
+
+        They cover all that is answered then: where a message has frames after that one, they come after the last.
+        """
         group = self._groups.open() if ticket.group is None else ticket.group
-        if ticket.group is None:
-            self._calibrated[ticket] = group
         self._groups.follow(group, message)
+        if ticket.group is not None:
+            return []
+        self._calibrated[ticket] = group
         return self.checkpoints(group)
 
     def _let_go(self, body: str) -> list[Event]:
