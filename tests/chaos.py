@@ -6,6 +6,7 @@ import socket
 import struct
 import threading
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import suppress
 
 FATES = {
@@ -19,6 +20,9 @@ FATES = {
 }
 """What becomes of a connection, and how often of so many."""
 
+NOTICED_AT_ONCE = {fate: often for fate, often in FATES.items() if fate != "falls silent"}
+"""Without the one that a client can notice by its patience only."""
+
 CHUNK = 16_384
 TRICKLE = 1500  # bytes
 
@@ -26,12 +30,13 @@ TRICKLE = 1500  # bytes
 class Proxy:
     """Carries connections to the targets in turn, so that sessions hop between them; runs in a thread of its own."""
 
-    def __init__(self, seed: int, *, lives: tuple[int, int]) -> None:
+    def __init__(self, seed: int, *, lives: tuple[int, int], fates: Mapping[str, int] = FATES) -> None:
         """`lives`: bytes that a doomed connection carries, at least and at most."""
         self.targets: list[int] = []
         self.met: Counter[str] = Counter()
         self._dice = random.Random(seed)
         self._lives = lives
+        self._fates = fates
         self._turn = 0
         self._loop = asyncio.new_event_loop()
         self._open: set[asyncio.Task[None]] = set()
@@ -59,7 +64,7 @@ class Proxy:
         task = asyncio.current_task()
         assert task is not None
         self._open.add(task)
-        fate = self._dice.choices(list(FATES), list(FATES.values()))[0]
+        fate = self._dice.choices(list(self._fates), list(self._fates.values()))[0]
         life = self._dice.randint(*self._lives)
         self._turn += 1
         others: tuple[asyncio.StreamWriter, ...] = ()

@@ -19,18 +19,16 @@ import pytest
 
 import fervor_client
 from bodies import motion
-from chaos import FATES, Proxy
+from chaos import FATES, NOTICED_AT_ONCE, Proxy
 from fervor_client import Estimate
 from live import Live
 from program import start_fervor
 
 KEY = "a key for tests that is long enough"
-SESSIONS, SYNC = 50, 10
 MISFORTUNES = 8
 KINDS = 5
-RATE_HZ, SECONDS = 12.0, 120  # the model's grid still has 30 steps a second
-FRAMES = int(RATE_HZ * SECONDS)
-LABELS = {100: "fear", 777: {"joy": 0.6, "pride": 0.3}, 1200: "unknown", 1300: "sadness"}
+RATE_HZ = 8.0  # the model's grid still has 30 steps a second
+LABELS = {20: "fear", 45: {"joy": 0.6, "pride": 0.3}, 500: "unknown", 800: "sadness"}
 OPTIONS = {"emotion": "joy", "checkpoint_s": 2.0, "retry_for": None, "open_timeout": 10.0}
 
 Told = list[Estimate]
@@ -95,62 +93,80 @@ class Misfortune(threading.Thread):
             self._proxy.targets[turn % 2] = replica.port
 
 
-def poses(kind: int):
-    return motion(FRAMES, seed=kind)
-
-
-def sync_stream(url: str, kind: int) -> tuple[Told, int]:
+def sync_stream(url: str, kind: int, frames: int) -> tuple[Told, int]:
     while True:  # a first connection is the caller's to try again
         with suppress(fervor_client.Unreachable, fervor_client.Overloaded):
             session = fervor_client.sync.connect(url, **OPTIONS, on_reconnect=lambda _: None)
             break
     with session:
-        for seq, pose in enumerate(poses(kind)):
+        for seq, pose in enumerate(motion(frames, seed=kind)):
             session.send(pose, t=seq / RATE_HZ, emotion=LABELS.get(seq))
         session.end(timeout=300)
         return list(session), session.reconnects
 
 
-async def async_stream(url: str, kind: int) -> tuple[Told, int]:
+async def async_stream(url: str, kind: int, frames: int) -> tuple[Told, int]:
     while True:
         with suppress(fervor_client.Unreachable, fervor_client.Overloaded):
             session = await fervor_client.connect(url, **OPTIONS, on_reconnect=lambda _: None)
             break
     async with session:
-        for seq, pose in enumerate(poses(kind)):
+        for seq, pose in enumerate(motion(frames, seed=kind)):
             await session.send(pose, t=seq / RATE_HZ, emotion=LABELS.get(seq))
         await session.end(timeout=300)
         return [estimate async for estimate in session], session.reconnects
 
 
-async def all_streams(url: str) -> list[tuple[Told, int]]:
+async def all_streams(url: str, *, sync: int, streams: int, frames: int) -> list[tuple[Told, int]]:
+    """`streams` streams at once, `sync` of them by the client for threads."""
     loop = asyncio.get_running_loop()
-    with ThreadPoolExecutor(SYNC) as threads:
-        sync = [loop.run_in_executor(threads, sync_stream, url, number % KINDS) for number in range(SYNC)]
-        return await asyncio.gather(*sync, *(async_stream(url, number % KINDS) for number in range(SYNC, SESSIONS)))
+    with ThreadPoolExecutor(sync) as threads:
+        by_threads = [loop.run_in_executor(threads, sync_stream, url, n % KINDS, frames) for n in range(sync)]
+        by_tasks = [async_stream(url, n % KINDS, frames) for n in range(sync, streams)]
+        return await asyncio.gather(*by_threads, *by_tasks)
+
+
+def check(got: list[tuple[Told, int]], live: Live, frames: int) -> None:
+    """Each stream is what it is on a service and a network that are well."""
+    expected = [sync_stream(live.stream, kind, frames)[0] for kind in range(KINDS)]
+    for number, (told, _) in enumerate(got):
+        assert [estimate.seq for estimate in told] == list(range(frames)), f"stream {number}: each once, in order"
+        assert told == expected[number % KINDS], f"stream {number}: to the bit"
+
+
+def test_streams_through_a_network_that_fails(live: Live, start_service) -> None:
+    """The small one, which always runs: two services that live, and connections that don't."""
+    proxy = Proxy(seed=3, lives=(2_000, 40_000), fates=NOTICED_AT_ONCE)
+    proxy.targets = [
+        int(start_service(checkpoint_keys=KEY, max_frames_per_second=1e6).address.rpartition(":")[2]) for _ in range(2)
+    ]
+    try:
+        got = asyncio.run(all_streams(proxy.url, sync=2, streams=8, frames=80))
+    finally:
+        proxy.close()
+    check(got, live, 80)
+    assert sum(reconnects for _, reconnects in got) > 8
+    assert {"resets", "ends"} <= set(proxy.met)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_fifty_streams_of_minutes_lose_nothing(live: Live) -> None:
-    expected = [sync_stream(live.stream, kind)[0] for kind in range(KINDS)]
-    proxy = Proxy(seed=11, lives=(20_000, 900_000))
+    frames = int(RATE_HZ * 120)
+    proxy = Proxy(seed=11, lives=(20_000, 600_000))
     with replicas(proxy) as pair:
         misfortune = Misfortune(pair, proxy)
         misfortune.start()
         try:
-            got = asyncio.run(all_streams(proxy.url))
+            got = asyncio.run(all_streams(proxy.url, sync=10, streams=50, frames=frames))
         finally:
             misfortune.over.set()
             misfortune.join()
             proxy.close()
-    for number, (told, _) in enumerate(got):
-        assert [estimate.seq for estimate in told] == list(range(FRAMES)), f"stream {number}: each once, in order"
-        assert told == expected[number % KINDS], f"stream {number}: to the bit"
+    check(got, live, frames)
     ends = pair[0].ends + pair[1].ends
     assert ends["SIGKILL"] >= 2
     assert ends["SIGTERM"] >= 2
     assert {-signal.SIGKILL, -signal.SIGTERM, 0} >= set(misfortune.statuses), "a service that is told to stop ends well"
     assert set(proxy.met) == set(FATES), "everything that can happen has happened"
-    assert sum(reconnects for _, reconnects in got) > SESSIONS
-    print(f"\n{SESSIONS} streams of {SECONDS} s: {sum(n for _, n in got)} reconnects, {dict(ends)}, {dict(proxy.met)}")
+    assert sum(reconnects for _, reconnects in got) > 50
