@@ -59,12 +59,12 @@ class Replica:
         self._carry(self.session.receive(message))
 
     def toil(self, most: int = 1_000_000) -> None:
-        """Up to `most` tickets in one batch, of each body one."""
+        """Up to `most` tickets, in batches as large as can be: of each slot one, as the engine wants it."""
         while self.work and most > 0:
-            batch: dict[str, Ticket] = {}
-            while self.work and self.work[0].body not in batch and len(batch) < most:
+            batch: dict[int, Ticket] = {}
+            while self.work and self.work[0].slot not in batch and len(batch) < most:
                 ticket = self.work.popleft()
-                batch[ticket.body] = ticket
+                batch[ticket.slot] = ticket
             most -= len(batch)
             for ticket, outcome in zip(batch.values(), self.engine.run(list(batch.values())), strict=True):
                 self._carry(self.session.conclude(ticket, outcome))
@@ -244,7 +244,7 @@ class Interrupted(RuleBasedStateMachine):
     @initialize(
         clock=st.sampled_from(["time", "frames"]),
         memory=st.sampled_from(["staggered", "stateful", "window"]),
-        delivery=st.just("every"),
+        delivery=st.sampled_from(["every", "latest"]),
         checkpoint_s=st.sampled_from([0.1, 0.5, 3.0]),
         by_emotion=st.booleans(),
     )
@@ -411,21 +411,32 @@ class Interrupted(RuleBasedStateMachine):
             most -= 1
 
     def _compare(self, key: Key, estimate: Estimate) -> None:
+        expected = self.reference.answers[key]
+        if self.client.start.delivery == "latest":  # any of its answers may be the first that comes, or the only one
+            assert bare(estimate) in map(bare, expected), f"{estimate} is none of {expected}"
+            return
         first, *again = self.client.answers[key]
-        expected = self.reference.answers[key][0]
-        if first.flags[-1:] == ("duplicate",) and expected.flags[-1:] != ("duplicate",):
-            first = first.model_copy(update={"flags": first.flags[:-1]})  # a repeated answer may overtake
-        assert first == expected, f"{first} is not {expected}"
-        for other in again[-1:] if self.client.start.delivery == "every" else ():
+        if first.flags[-1:] == ("duplicate",) and expected[0].flags[-1:] != ("duplicate",):
+            first = bare(first)  # a repeated answer may overtake
+        assert first == expected[0], f"{first} is not {expected[0]}"
+        for other in again[-1:]:
             flags = tuple(flag for flag in other.flags if flag not in ("duplicate", "late"))
-            own = tuple(flag for flag in expected.flags if flag not in ("duplicate", "late"))
+            own = tuple(flag for flag in expected[0].flags if flag not in ("duplicate", "late"))
             if "late" not in other.flags:
-                assert other.model_copy(update={"flags": flags}) == expected.model_copy(update={"flags": own}), other
+                same = expected[0].model_copy(update={"flags": own})
+                assert other.model_copy(update={"flags": flags}) == same, other
+
+
+def bare(estimate: Estimate) -> Estimate:
+    """An answer without the note that it is not the first to its frame."""
+    return estimate.model_copy(update={"flags": tuple(flag for flag in estimate.flags if flag != "duplicate")})
 
 
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("examples", [8, pytest.param(120, marks=pytest.mark.slow)])
 def test_any_conversation_cut_anywhere(examples):
+    """The same conversations in every run, so that a failure in CI is one that can be repeated."""
     run_state_machine_as_test(
-        Interrupted, settings=settings(max_examples=examples, stateful_step_count=30, deadline=None)
+        Interrupted,
+        settings=settings(max_examples=examples, stateful_step_count=30, deadline=None, derandomize=True),
     )
