@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from bodies import host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
+from fervor.model import Model, Outputs, default_model_path
 from fervor.protocol.messages import (
     BodyEnd,
     Checkpoint,
@@ -32,8 +33,9 @@ SEALER = Sealer((b"key",), 60.0)
 class Replica:
     """A service with the common key, and one session on it."""
 
-    def __init__(self, **limits) -> None:
-        self.engine = Engine(model(), capacity=8)
+    def __init__(self, runtime: Model | None = None, **limits) -> None:
+        runtime = runtime or model()
+        self.engine = Engine(runtime, capacity=8)
         base = host(self.engine.claim, **limits)
         self.session = Session(
             "s",
@@ -41,7 +43,7 @@ class Replica:
                 base.model,
                 base.metadata,
                 base.limits,
-                base.fingerprint,
+                runtime.fingerprint,
                 base.claim,
                 seal=lambda content: SEALER.seal(content, 0.0),
                 unseal=lambda token: SEALER.open(token, 1.0),
@@ -145,6 +147,35 @@ def test_the_last_checkpoint_of_a_drain_covers_everything():
     whole.say(start)
     other.say(start.model_copy(update={"resume": (last.token,)}))
     assert estimates(run(whole, frames))[200:] == estimates(run(other, frames[200:]))
+
+
+class OtherKind(Model):
+    """The same file on a CPU that rounds otherwise: all that a call gives is one unit in the last place higher."""
+
+    def run(self, rotations, mask, emotion, states) -> Outputs:
+        given = super().run(rotations, mask, emotion, states)
+        higher = {name: np.nextafter(state, np.float32(np.inf)) for name, state in given.states.items()}
+        one = np.float32(1.0)
+        return Outputs(np.nextafter(given.intensity, one), np.nextafter(given.intensity_by_emotion, one), higher)
+
+
+@pytest.mark.parametrize("memory", ["staggered", "stateful", "window"])
+def test_another_kind_of_cpu_says_so_and_goes_on_to_a_millionth(memory):
+    other = OtherKind.load(default_model_path())
+    other.fingerprint = "another"
+    start, frames = SessionStart(memory=memory, checkpoint_s=1.0, emotion="joy"), a_life(3)
+    whole, before, after = Replica(), Replica(), Replica(other)
+    whole.say(start)
+    before.say(start)
+    expected = estimates(run(whole, frames))
+    token = [said for said in run(before, frames[:130]) if isinstance(said, Checkpoint)][-1]
+    (started,) = after.say(start.model_copy(update={"resume": (token.token,)}))
+    assert (started.fingerprint, started.resumed[0].same_runtime) == ("another", False)
+    got = estimates(run(after, frames[token.seq + 1 :]))
+    differences = [abs(one.intensity - two.intensity) for one, two in zip(got, expected[token.seq + 1 :], strict=True)]
+    assert 0.0 < max(differences) <= 1e-6
+    same = [[each.model_copy(update={"intensity": 0.0}) for each in some] for some in (got, expected[token.seq + 1 :])]
+    assert same[0] == same[1]
 
 
 def test_several_bodies_resume_together():
