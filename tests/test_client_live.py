@@ -3,7 +3,11 @@
 import asyncio
 import contextlib
 import io
+import itertools
 import json
+import signal
+import subprocess
+import sys
 import textwrap
 import threading
 from collections.abc import Callable
@@ -16,7 +20,7 @@ from bodies import motion
 from fervor.emotions import EMOTIONS
 from fervor.errors import AuthError, FrameError, InputError, Overloaded, ProtocolError, RateExceeded
 from fervor.skeletons.rig import SEGMENTS
-from live import Live
+from live import Live, eventually
 
 RATE_HZ = 60.0
 
@@ -274,3 +278,66 @@ def test_an_estimate_is_a_line_of_json_and_back(live: Live) -> None:
     with fervor_client.sync.connect(live.stream) as session:
         estimate = session.estimate(motion(1)[0], t=0.0)
     assert fervor_client.Estimate.model_validate(json.loads(estimate.model_dump_json())) == estimate
+
+
+# --- being stopped ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reads", [True, False])
+async def test_a_task_that_is_cancelled_in_mid_stream_leaves_nothing(live: Live, reads: bool) -> None:
+    before, under_way = asyncio.all_tasks(), asyncio.Event()
+
+    async def stream() -> None:
+        async with fervor_client.connect(live.stream, checkpoint_s=0.1, window=20) as session:
+            for number, pose in enumerate(itertools.cycle(motion(60))):
+                await session.send(pose, t=number / RATE_HZ)
+                if number == 100:
+                    under_way.set()
+                    while reads:
+                        await session.recv()
+
+    task = asyncio.create_task(stream())
+    await under_way.wait()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await asyncio.wait_for(task, 30)
+    assert asyncio.all_tasks() == before
+    await eventually(lambda: live.service.sessions.open == 0)
+
+
+SYNC = """
+import itertools, sys, fervor_client
+with fervor_client.sync.connect(sys.argv[1], checkpoint_s=0.1) as session:
+    for number in itertools.count():
+        session.send([[0, 0, 0, 1]] * 13, t=number / 60)
+        if number == 100:
+            print("under way", flush=True)
+"""
+ASYNC = """
+import asyncio, itertools, sys, fervor_client
+async def stream():
+    async with fervor_client.connect(sys.argv[1], checkpoint_s=0.1) as session:
+        for number in itertools.count():
+            await session.send([[0, 0, 0, 1]] * 13, t=number / 60)
+            if number == 100:
+                print("under way", flush=True)
+asyncio.run(stream())
+"""
+
+
+@pytest.mark.parametrize("program", [SYNC, ASYNC], ids=["sync", "async"])
+def test_ctrl_c_ends_a_program_at_once_and_quietly(live: Live, program: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-X", "dev", "-c", program, live.stream],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "under way\n"
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == -signal.SIGINT
+    assert said.rstrip().endswith("KeyboardInterrupt")
+    for complaint in ("Exception in thread", "Exception ignored", "Warning", "was destroyed", "never retrieved"):
+        assert complaint not in said, said
