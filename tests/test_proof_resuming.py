@@ -166,7 +166,9 @@ class Client:
     def _calibrated(self, message: SessionCalibrated) -> None:
         self.start = self.start.model_copy(update={"skeleton": message.skeleton})
         if not self._skips:
-            done = max(place for place, entry in enumerate(self.log) if entry.answered)
+            waiting = (place for place, entry in enumerate(self.log) if entry.seq is not None and not entry.answered)
+            until = next(waiting, len(self.log))
+            done = max((place for place, entry in enumerate(self.log[:until]) if entry.answered), default=-1)
             del self.log[: done + 1]
         self._drop(lambda entry: isinstance(entry.message, SessionCalibrate))
         for kept in self.bodies.values():
