@@ -10,7 +10,8 @@ import msgpack
 from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import FrameError, MessageError
-from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
+from fervor.protocol.frame_decoder import frames_from_json, frames_from_msgpack
+from fervor.protocol.messages import PROTOCOL, ClientMessage, Estimate, Estimates, ServerMessage
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 _SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
@@ -42,7 +43,8 @@ class JsonCodec:
 
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
-        return self._decode(_CLIENT, data)
+        frames = frames_from_json(data) if isinstance(data, str) else None
+        return frames or self._decode(_CLIENT, data)
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -69,7 +71,8 @@ class MsgpackCodec:
 
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
-        return self._decode(_CLIENT, data)
+        frames = frames_from_msgpack(data) if isinstance(data, bytes) else None
+        return frames or self._decode(_CLIENT, data)
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -77,7 +80,14 @@ class MsgpackCodec:
 
     def encode(self, message: ClientMessage | ServerMessage) -> bytes:
         """The message as MessagePack; fields that say nothing are left out."""
-        packed = msgpack.packb(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
+        match message:
+            case Estimate():  # nothing in it needs pydantic's help: its fields are what is packed
+                packed = msgpack.packb(vars(message))
+            case Estimates():
+                estimates = [vars(estimate) for estimate in message.estimates]
+                packed = msgpack.packb({"type": message.type, "estimates": estimates})
+            case _:
+                packed = msgpack.packb(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
         assert isinstance(packed, bytes)
         return packed
 

@@ -42,11 +42,10 @@ def frame_pose(
     if frame.p is not None:
         raise _refuse(frame, "has positions in p; expected quaternions in q alone, as this skeleton has rotations")
     rotations = _joints_of(frame, frame.q, "q", joints, 4)
-    with np.errstate(over="ignore"):
-        lengths = np.sqrt(np.sum(rotations * rotations, axis=-1))  # [joint]
-    wrong = ~(lengths <= NOT_UNIT_ABOVE)
-    if wrong.any():
-        raise _refuse(frame, _bad_quaternion(rotations, joints, int(wrong.argmax())))
+    lengths = _lengths(rotations, can_overflow=not isinstance(frame.q, Raw))
+    right = lengths <= NOT_UNIT_ABOVE
+    if not right.all():
+        raise _refuse(frame, _bad_quaternion(rotations, joints, int(right.argmin())))
     observed = lengths >= UNTRACKED_BELOW
     if frame.mask is not None:
         observed &= np.array(frame.mask)
@@ -81,6 +80,15 @@ def frame_points(frame: Frame, joints: Sequence[str]) -> tuple[npt.NDArray[np.fl
         where = f"joint {index} ({joints[index]})"
         raise _refuse(frame, f"has {positions[index].tolist()} at {where}; expected three finite numbers")
     return positions, ~untracked if frame.mask is None else ~untracked & np.array(frame.mask)
+
+
+def _lengths(rotations: npt.NDArray[np.float64], *, can_overflow: bool) -> npt.NDArray[np.float64]:
+    """Of quaternions [joint, 4]; what was a float32 can't overflow, and is spared the cost of `errstate`."""
+    if can_overflow:
+        with np.errstate(over="ignore"):
+            return _lengths(rotations, can_overflow=False)
+    lengths: npt.NDArray[np.float64] = np.sqrt(np.add.reduce(rotations * rotations, axis=-1))
+    return lengths
 
 
 def _joints_of(

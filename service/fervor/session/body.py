@@ -13,6 +13,7 @@ from fervor.emotions import EMOTIONS, UNKNOWN
 from fervor.levels import LevelState, next_level
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
+from fervor.protocol.trusted import trusted
 from fervor.session.answers import Answers, Arrays
 from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
@@ -208,17 +209,19 @@ class Body:
             self._emotion = ticket.steps[-1].label.name
         if ticket.steps and outcome.intensity is not None:
             self._level = self._next_level(outcome.intensity, ticket.time)
-        estimate = Estimate(
-            body=self.name,
-            seq=ticket.seq,
-            t=ticket.time,
-            intensity=outcome.intensity,
-            level=self._level.level if self._level and outcome.intensity is not None else None,
-            emotion=self._emotion,
-            status=self._status(ticket, outcome),
-            flags=(*ticket.flags, "jump") if outcome.jumped else ticket.flags,
-            by_emotion=self._by_emotion(outcome),
-        )
+        fields = {
+            "type": "estimate",
+            "body": self.name,
+            "seq": ticket.seq,
+            "t": ticket.time,
+            "intensity": outcome.intensity,
+            "level": self._level.level if self._level and outcome.intensity is not None else None,
+            "emotion": self._emotion,
+            "status": self._status(ticket, outcome),
+            "flags": (*ticket.flags, "jump") if outcome.jumped else ticket.flags,
+            "by_emotion": self._by_emotion(outcome),
+        }
+        estimate = trusted(Estimate, fields)
         self._answers.give(ticket.seq, estimate)
         return estimate
 
