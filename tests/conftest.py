@@ -5,10 +5,12 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import get_args
 
 import httpx
 import pytest
 
+from fervor.settings import Settings, Transport
 from live import Live, running
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -34,18 +36,31 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("bench")
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Tests of the server that start a service run on both transports."""
+    if "transport" in metafunc.fixturenames and metafunc.definition.path.name.startswith("test_server_"):
+        metafunc.parametrize("transport", get_args(Transport), indirect=True, scope="session")
+
+
 @pytest.fixture(scope="session")
-def live() -> Iterator[Live]:
-    """A service with the default settings, one for all tests."""
-    with running(max_frames_per_second=1e6) as service:
+def transport(request: pytest.FixtureRequest) -> Transport:
+    """How messages get from the socket to their session; the default one unless a test asks for both."""
+    chosen: Transport = getattr(request, "param", Settings.model_fields["transport"].default)
+    return chosen
+
+
+@pytest.fixture(scope="session")
+def live(transport: Transport) -> Iterator[Live]:
+    """A service with the default settings, one for all tests of a transport."""
+    with running(max_frames_per_second=1e6, transport=transport) as service:
         yield service
 
 
 @pytest.fixture
-def start_service() -> Iterator[Callable[..., Live]]:
+def start_service(transport: Transport) -> Iterator[Callable[..., Live]]:
     """Starts services with settings of their own: `start_service(max_bodies=1)`."""
     with ExitStack() as stack:
-        yield lambda **settings: stack.enter_context(running(**settings))
+        yield lambda **settings: stack.enter_context(running(**{"transport": transport, **settings}))
 
 
 @pytest.fixture

@@ -24,15 +24,15 @@ class Live:
     """A running service."""
 
     def __init__(self, settings: Settings) -> None:
-        self._bound = bind("127.0.0.1", 0)
-        self.address = f"127.0.0.1:{self._bound.getsockname()[1]}"
+        self.bound = bind("127.0.0.1", 0)
+        self.address = f"127.0.0.1:{self.bound.getsockname()[1]}"
         self.url = f"http://{self.address}"
         self.stream = f"ws://{self.address}/v1/stream"
         config = configure(settings)
         self.service: Service = config.app.state.service
         self._up = threading.Event()
         self._server = _Telling(config, self._up)
-        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self._bound]}, daemon=True)
+        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [self.bound]}, daemon=True)
 
     def start(self) -> None:
         self._thread.start()
@@ -42,7 +42,7 @@ class Live:
         self._server.should_exit = True
         self._thread.join(30)
         assert not self._thread.is_alive(), "the service did not stop"
-        self._bound.close()
+        self.bound.close()
 
 
 class _Telling(Server):

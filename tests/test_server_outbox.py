@@ -20,6 +20,12 @@ class Reader:
     async def receive(self) -> None:
         return None
 
+    def listen(self, take) -> None:
+        pass
+
+    def write(self, message: str | bytes) -> bool:
+        return False
+
     async def send(self, message: str | bytes) -> None:
         await self.allowed.acquire()
         if self.gone:

@@ -51,7 +51,7 @@ def test_plain_http_is_asked_to_upgrade(http: httpx.Client) -> None:
 async def test_compression_is_off_and_nagle_too(live: Live) -> None:
     async with websockets.connect(live.stream, subprotocols=[PROTOCOL]) as offering:  # permessage-deflate
         assert not offering.response.headers.get("Sec-WebSocket-Extensions")
-    assert live._bound.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+    assert live.bound.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 async def test_what_the_service_says_of_itself(live: Live) -> None:
@@ -222,6 +222,7 @@ async def test_a_skeleton_with_too_many_joints_is_refused(start_service) -> None
 
 async def test_a_slow_reader_that_wants_the_latest_gets_it_and_is_never_closed(start_service) -> None:
     service = start_service(max_unsent_bytes=20_000, max_frames_per_second=1e9)
+    service.bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 16_384)  # its connections inherit it
     slow = RawClient(service)
     count = 600  # answers of 8 kB: many times what the sockets and the outbox hold
 
@@ -235,6 +236,7 @@ async def test_a_slow_reader_that_wants_the_latest_gets_it_and_is_never_closed(s
 
     with slow.socket:
         await asyncio.to_thread(send)
+        await eventually(lambda: service.service.drain.all_traffic().superseded > 0, seconds=30)
         received = await asyncio.to_thread(slow.read_until, f'"body 15","seq":{count - 1},'.encode())
     seqs = [int(number) for number in re.findall(rb'"body 15","seq":(\d+),', received)]
     assert seqs == sorted(set(seqs))

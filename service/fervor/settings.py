@@ -32,6 +32,8 @@ LogLevel = Literal["critical", "error", "warning", "info", "debug"]
 
 LogFormat = Literal["text", "json"]
 
+Transport = Literal["direct", "asgi"]
+
 
 class SettingsError(InputError):
     """A setting that can't be used."""
@@ -69,6 +71,11 @@ class Settings(BaseSettings):
     skeletons: Path | None = Field(None, description="folder with calibrated skeletons (*.json), known by their names")
 
     capacity: int = Field(1024, ge=1, le=65536, description="bodies the service follows at once, over all sessions")
+    transport: Transport = Field(
+        "direct",
+        description="how messages get from the socket to their session: `direct`, past ASGI, or `asgi`, slower and the "
+        "same to the bit",
+    )
     max_connections: int = Field(
         2048, ge=1, description="connections at once, sessions included; one more is told to come later and closed"
     )

@@ -82,6 +82,7 @@ class Conversation:
         self._opened = self._heard = self._loop.time()  # seconds; `heard`: when the newest message came
         self._pace = Pace(service.settings.max_frames_per_second, service.settings.max_frames_per_message)
         self._unanswered = 0
+        self._waits_for_message = False
         self._room = asyncio.Event()
         self._patience = asyncio.timeout(None)
         soonest = min(service.settings.start_timeout_s, service.settings.idle_timeout_s)
@@ -109,18 +110,39 @@ class Conversation:
 
     async def _listen(self) -> None:
         """Take messages until the end; hold back a client far ahead of its answers, and all when too much waits."""
+        self._wire.listen(self._take_at_once)
         while self._session.state is not SessionState.CLOSED:
+            self._waits_for_message = True
             message = await self._wire.receive()
+            self._waits_for_message = False
             if message is None:
                 return
-            self._heard = self._loop.time()
-            self._traffic.bytes_in += len(message)
+            self._note(message)
             if self._backlog.full:
                 await self._backlog.wait()
             self._take(message)
-            while self._unanswered >= self._settings.max_unanswered_frames:
+            while self._has_enough:
                 self._room.clear()
                 await self._room.wait()
+
+    def _take_at_once(self, message: str | bytes) -> bool:
+        """Take a message in the turn in which it came, unless something holds it back: then `_listen` gets it."""
+        if not self._waits_for_message or self._backlog.full or self._has_enough:
+            return False
+        if self._session.state is SessionState.CLOSED:
+            return False
+        self._note(message)
+        self._take(message)
+        return True
+
+    def _note(self, message: str | bytes) -> None:
+        self._heard = self._loop.time()
+        self._traffic.bytes_in += len(message)
+
+    @property
+    def _has_enough(self) -> bool:
+        """Whether so many frames are unanswered that no more are taken just now."""
+        return self._unanswered >= self._settings.max_unanswered_frames
 
     def _sign_off(self) -> None:
         totals, seconds = self.totals, self._loop.time() - self._opened

@@ -1,5 +1,6 @@
-"""What waits to be sent to one client: in order, bounded in bytes, sent by one task.
+"""What waits to be sent to one client: in order, bounded in bytes.
 
+While nothing waits, a message is written at once if the wire can; all else is sent by one task.
 A client that reads too slowly fills its outbox and nobody else's. A message that a newer one makes useless (an older
 checkpoint of the body; with delivery `latest`, an older estimate) leaves when that comes: newest wins. Who puts into a
 full outbox is told so and decides.
@@ -39,6 +40,9 @@ class Outbox:
             message: encoded.
             topic: takes the place of what still waits under the same topic; None for none.
         """
+        if not (self._waiting or self._stuck or isinstance(message, Close)) and self._wire.write(message):
+            self.bytes_sent += len(message)
+            return
         self._put += 1
         key = self._put if topic is None else topic
         old = self._waiting.pop(key, None)

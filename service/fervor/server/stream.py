@@ -16,7 +16,7 @@ from fervor.server.auth import TOKEN_SUBPROTOCOL
 from fervor.server.conversation import Conversation
 from fervor.server.problems import problem, problem_responses
 from fervor.server.service import Service, service_of
-from fervor.server.wire import StarletteWire
+from fervor.server.wire import wire_to
 
 router = APIRouter(prefix="/v1", tags=["stream"])
 
@@ -29,7 +29,7 @@ async def stream(websocket: WebSocket, service: Annotated[Service, Depends(servi
     codec, agreed = choose_codec(websocket.scope["subprotocols"])
     with service.sessions.admitted(), suppress(WebSocketDisconnect):
         await websocket.accept(agreed)
-        await Conversation(StarletteWire(websocket), service, codec, client=websocket.state.client).run()
+        await Conversation(wire_to(websocket), service, codec, client=websocket.state.client).run()
 
 
 @router.get("/stream", status_code=426, response_class=Response, responses=problem_responses(401, 403, 426))

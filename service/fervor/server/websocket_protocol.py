@@ -1,23 +1,30 @@
 """uvicorn's WebSocket protocol, with what it leaves out.
 
+With transport `direct` it offers a shortcut past ASGI (`fervor.server.wire`): messages that come whole are handed to
+the conversation in the turn in which they came, and answers are written as they are given.
+
 Frames that are no messages (pings, pongs, pieces of a message) have a pace, too. Pings of a client that reads nothing
 are not answered, so that pongs can't pile up. A connection whose conversation is over is cut if its client does not
 take what is left. Nothing of a request's headers is logged.
 """
 
+import struct
 from asyncio import TimerHandle
 from http import HTTPStatus
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.datastructures import Headers
-from websockets.frames import Frame
-from websockets.http11 import Response
+from websockets.frames import Frame, Opcode
+from websockets.http11 import Request, Response
+from websockets.protocol import CONNECTING, OPEN
 
 from fervor.errors import RateExceeded
+from fervor.server.cutter import FIN, SHORT, Cutter, Message
 from fervor.server.pace import Pace
 from fervor.server.problems import CODES, problem
 from fervor.server.service import Service
+from fervor.server.wire import EXTENSION, Take
 
 PIECE = 4096
 """Bytes that are read in one go; so many small frames at most come between two looks at the pace."""
@@ -36,6 +43,10 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         self._neighbours = service.connections
         rate = service.settings.max_frames_per_second
         self._pace = Pace(rate, service.settings.max_frames_per_message)
+        self._direct = service.settings.transport == "direct"
+        self._cutter: Cutter | None = None
+        self.take: Take | None = None
+        """See `Shortcut`."""
         self._cut: TimerHandle | None = None
         self.conn.debug = False  # it would log headers, tokens among them
         self.conn.reject = _reject  # type: ignore[method-assign]  # its own refusals are plain text
@@ -45,14 +56,62 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         if self._cut is not None:
             self._cut.cancel()
         self._neighbours.leave(self.transport)
+        self.take = None
         super().connection_lost(exc)
+
+    def handle_connect(self, event: Request) -> None:
+        """A handshake: the application decides on it."""
+        super().handle_connect(event)
+        if self._direct and not self.handshake_complete:
+            self._cutter = Cutter(most_bytes=self.config.ws_max_size)
+            extensions: dict[str, Any] = self.scope["extensions"]  # type: ignore[assignment]  # ours is no dict
+            extensions[EXTENSION] = self  # the task that reads it runs later
 
     def data_received(self, data: bytes) -> None:
         """Bytes of frames."""
+        if self._cutter is None:
+            self._parse(data)
+            return
+        for part in self._cutter.cut(data):
+            if isinstance(part, bytes):
+                self._parse(part)
+            elif self.conn.state in (CONNECTING, OPEN) and not self.transport.is_closing():
+                self._hand_over(part)
+
+    def _parse(self, data: bytes) -> None:
+        """Let the complete parser have these bytes."""
         for start in range(0, len(data), PIECE):
             if self.transport.is_closing():
                 return
             super().data_received(data[start : start + PIECE])
+
+    def _hand_over(self, message: Message) -> None:
+        self.curr_msg_data_type = "text" if message.is_text else "bytes"
+        self.frames = [message.payload]
+        self.send_receive_event_to_app()
+
+    def send_receive_event_to_app(self) -> None:
+        """A message is there."""
+        if self.take is None or self.close_sent or not self.queue.empty():
+            super().send_receive_event_to_app()
+            return
+        data = b"".join(self.frames)
+        try:
+            message = data.decode() if self.curr_msg_data_type == "text" else data
+        except UnicodeDecodeError:
+            super().send_receive_event_to_app()  # which says so
+            return
+        if self.take(message):
+            self.frames = []
+        else:
+            super().send_receive_event_to_app()
+
+    def write(self, message: str | bytes) -> bool:
+        """See `Shortcut`."""
+        if self.conn.state is not OPEN or not self.writable.is_set() or self.transport.is_closing():
+            return False
+        self.transport.write(_as_frame(message))
+        return True
 
     def handle_ping(self) -> None:
         """Answer, if the client reads; RFC 6455 asks for an answer to the newest ping only."""
@@ -88,6 +147,19 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
             self.conn.data_to_send()
             self.conn.fail(error.close_code, error.code)
             self.handle_parser_exception()
+
+
+def _as_frame(message: str | bytes) -> bytes:
+    """A message as a frame of a server: in one, without a mask."""
+    opcode, payload = (Opcode.TEXT, message.encode()) if isinstance(message, str) else (Opcode.BINARY, message)
+    size = len(payload)
+    if size < SHORT:
+        head = struct.pack("!BB", FIN | opcode, size)
+    elif size < 65536:
+        head = struct.pack("!BBH", FIN | opcode, SHORT, size)
+    else:
+        head = struct.pack("!BBQ", FIN | opcode, SHORT + 1, size)
+    return head + payload
 
 
 def _reject(status: int, text: str) -> Response:
