@@ -64,7 +64,7 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         super().handle_connect(event)
         if self._direct and not self.handshake_complete:
             self._cutter = Cutter(most_bytes=self.config.ws_max_size)
-            extensions: dict[str, Any] = self.scope["extensions"]  # type: ignore[assignment]  # ours is no dict
+            extensions: dict[str, Any] = self.scope["extensions"]
             extensions[EXTENSION] = self  # the task that reads it runs later
 
     def data_received(self, data: bytes) -> None:
