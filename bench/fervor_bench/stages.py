@@ -19,13 +19,18 @@ from fervor_bench.errors import BenchError
 SAMPLES_PER_SECOND = 250
 
 RULES: tuple[tuple[str, str], ...] = (
-    ("parse and validate", r"decode_client|_from_raw|_joints_of|fervor/protocol/poses|fervor/server/pace"),
+    (
+        "parse and validate",
+        r"decode_client|_from_raw|_joints_of|fervor/protocol/(frame_decoder|poses)|fervor/server/pace",
+    ),
     ("encode", r"\bencode\b.*fervor/protocol|fervor/server/encod"),
     ("checkpoint", r"checkpoint|sealing"),
     ("model", r"fervor/model\.py"),
     ("engine", r"fervor/(engine|skeletons|rotations|emotions)"),
     ("session", r"fervor/(session|levels)"),
+    ("send", r"\b(write|_as_frame)\b.*fervor/server/websocket_protocol"),
     ("send", r"fervor/server/outbox|\bsend(_\w+)?\b.*(uvicorn|starlette|websockets)|\b_?(write|send)\w*\b.*asyncio"),
+    ("receive", r"fervor/server/(cutter|websocket_protocol)"),
     ("receive", r"data_received|handle_\w+.*uvicorn|\breceive\w*\b|(websockets)/(frames|protocol|streams)"),
     ("metrics", r"fervor/server/metrics|prometheus_client"),
     ("conversation", r"fervor/server"),
