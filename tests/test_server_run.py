@@ -1,6 +1,7 @@
 """The service as a process: where it listens, how it starts, how it ends."""
 
 import asyncio
+import gc
 import json
 import os
 import signal
@@ -16,7 +17,8 @@ import pytest
 import websockets
 
 from bodies import motion
-from fervor.server.run import AddressError, bind
+from fervor.server.run import AddressError, Server, bind, run
+from fervor.settings import Settings
 from live import PROTOCOL, Live, frames_of, score_request, talk
 from program import fervor, start_fervor
 
@@ -48,6 +50,18 @@ def test_a_port_in_use_is_told() -> None:
 def test_an_unknown_host_is_told() -> None:
     with pytest.raises(AddressError, match="can't listen on no such host port 80: "):
         bind("no such host", 80)
+
+
+def test_what_is_there_before_the_first_client_is_out_of_the_collectors_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    frozen: list[int] = []
+    monkeypatch.setattr("fervor.server.run.configure_logs", lambda *_: None)
+    monkeypatch.setattr("fervor.server.run.end_well", lambda: None)
+    monkeypatch.setattr(Server, "run", lambda *_, **__: frozen.append(gc.get_freeze_count()))
+    try:
+        run(Settings.load(port=0))
+    finally:
+        gc.unfreeze()
+    assert frozen[0] > 10_000
 
 
 async def test_connections_lose_no_time_and_hang_for_no_peer(live: Live) -> None:

@@ -5,6 +5,7 @@ longer ready, streams get their last checkpoints and 1012, and what else is unde
 With more than one worker, a supervisor runs that many such processes on the same address.
 """
 
+import gc
 import logging
 import resource
 import signal
@@ -97,7 +98,9 @@ def run(settings: Settings) -> None:
     end_well()
     with bind(settings.host, settings.port) as bound:
         if settings.workers == 1:
-            Server(configure(settings)).run(sockets=[bound])
+            server = Server(configure(settings))
+            gc.freeze()  # modules and the model stay to the end: the collector need not walk them beside live streams
+            server.run(sockets=[bound])
         else:
             from fervor.server.supervisor import Supervisor
 

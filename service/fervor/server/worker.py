@@ -6,6 +6,7 @@ connections first. It does not outlive the supervisor. Ctrl-C and SIGHUP, which 
 processes, are the supervisor's to hear.
 """
 
+import gc
 import os
 import signal
 import socket
@@ -41,6 +42,7 @@ class Worker:
         try:
             config = configure(self.settings)
             config.app.state.service.metrics.gather(self.board, self.place)  # type: ignore[union-attr]
+            gc.freeze()  # as in `fervor.server.run`
             Server(config, on_listening=lambda _: self.ready.send("serves"), board=self.board).run(sockets=[self.bound])
         except FervorError as error:
             sys.stderr.write(f"fervor: {error.message}\n")
