@@ -92,3 +92,44 @@ async def test_a_client_that_is_gone_ends_it_quietly() -> None:
     outbox.put("x")
     await outbox.send_all()
     assert outbox.bytes_sent == 0
+
+
+class Prompt(Reader):
+    """A wire that takes what it can at once, in the same list."""
+
+    def __init__(self, room: int) -> None:
+        super().__init__()
+        self.room = room
+
+    def write(self, message: str | bytes) -> bool:
+        if not self.room:
+            return False
+        self.room -= 1
+        self.taken.append(message)
+        return True
+
+
+async def test_what_the_wire_takes_at_once_never_waits() -> None:
+    wire = Prompt(room=2)
+    outbox = Outbox(wire, most_bytes=100)
+    outbox.put("abc")
+    outbox.put("de", topic="t")
+    assert wire.taken == ["abc", "de"]
+    assert (outbox.bytes_sent, outbox.superseded) == (5, 0)
+
+
+async def test_nothing_overtakes_what_waits() -> None:
+    wire = Prompt(room=1)
+    outbox = Outbox(wire, most_bytes=100)
+    outbox.put("first")
+    outbox.put("waits")
+    wire.room = 10  # there is room again, but something waits, and then is on its way
+    outbox.put("waits too")
+    sending = asyncio.create_task(outbox.send_all())
+    await asyncio.sleep(0)
+    outbox.put("later")
+    for _ in range(3):
+        wire.allowed.release()
+    outbox.put(CLOSE)
+    await sending
+    assert wire.taken == ["first", "waits", "waits too", "later", (1000, "ended")]

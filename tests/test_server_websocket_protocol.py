@@ -10,6 +10,7 @@ from contextlib import suppress
 import pytest
 
 from bodies import motion
+from fervor.settings import Transport
 from live import Live, RawClient, eventually, frames_of, talk
 
 FRAMES = frames_of(motion(40, seed=4))
@@ -191,3 +192,50 @@ async def test_text_on_msgpack_is_told_and_survived(start_service) -> None:
         return 0
 
     assert await beside(service, speak, subprotocol="fervor.v1.msgpack") == 0
+
+
+async def test_a_connection_takes_the_way_that_was_set(live: Live, transport: Transport) -> None:
+    async with talk(live) as stream:
+        await stream.start()
+        (connection,) = live_connections(live)
+        assert (connection.take is not None) == (transport == "direct")
+
+
+async def test_bytes_that_come_one_by_one_change_no_bit(start_service) -> None:
+    service = start_service()
+    messages = [{"type": "session.start", "emotion": "joy"}, *({"type": "frame", **frame} for frame in FRAMES[:3])]
+    async with talk(service) as stream:
+        await stream.start(emotion="joy")
+        expected = await stream.follow(FRAMES[:3])
+
+    def dribble(sick: RawClient) -> bytes:
+        sick.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for message in messages:
+            payload = json.dumps(message).encode()
+            for byte in struct.pack("!BBH", FIN | TEXT, 0xFE, len(payload)) + b"\0\0\0\0" + payload:
+                sick.socket.sendall(bytes([byte]))
+        return sick.read_until(b'"seq":2,')
+
+    with RawClient(service).socket:
+        pass  # a client that leaves at once is nobody's trouble
+    sick = RawClient(service)
+    with sick.socket:
+        received = await asyncio.to_thread(dribble, sick)
+    for estimate in expected[:2]:
+        assert json.dumps(estimate, separators=(",", ":")).encode() in received
+
+
+async def test_pings_between_and_inside_messages_are_answered(start_service) -> None:
+    def mix(sick: RawClient) -> int:
+        start = json.dumps({"type": "session.start"}).encode()
+        halves = piece(TEXT, start[:9], flags=0), piece(CONTINUATION, start[9:])
+        sick.socket.sendall(halves[0] + piece(PING, b"inside") + halves[1])
+        assert b"inside" in sick.read_until(b"session.started")
+        sick.socket.sendall(
+            piece(PING, b"before") + piece(TEXT, b'{"type":"ping","id":"between"}') + piece(PING, b"after")
+        )
+        said = sick.read_until(b"after")
+        assert said.index(b"before") < said.index(b"after")
+        return len(said) if b"between" in said else len(sick.read_until(b"between"))
+
+    assert await beside(start_service(), mix) > 0
