@@ -64,11 +64,11 @@ def test_service_and_floor_are_measured_side_by_side(workshop: Path, tmp_path: P
 
 @pytest.mark.slow
 def test_stages_and_scoring_are_measured_too(workshop: Path) -> None:
-    plan = replace(TINY, contestants=("fervor",), sessions=(1,), idle=0, most_sessions=0)
+    plan = replace(TINY, contestants=("fervor",), seconds=1.0, sessions=(1,), idle=0, most_sessions=0)
     results = measure_all(plan, stages=True, scoring=True, told=quiet)
     (breakdown,) = results.breakdowns
     assert sum(stage.share for stage in breakdown.stages) == pytest.approx(1.0)
-    assert {"session", "engine", "model"} <= {stage.name for stage in breakdown.stages}
+    assert {"engine", "model"} <= {stage.name for stage in breakdown.stages}
     assert results.beside is not None
     text = shown(results)
     assert "stages of a frame" in text

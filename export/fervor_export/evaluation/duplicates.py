@@ -44,8 +44,8 @@ NEAR_RAD = 0.45
 MOVING_RAD = 0.12
 """Norm of a window below which it stands still, and is no evidence."""
 
-KEPT_EVERY, ASKED_EVERY = 2, 6
-"""Frames between windows that are looked through, and between those looked for."""
+KEPT_EVERY, ASKED_EVERY = 1, 6
+"""Frames between windows that are looked through, and between those looked for: what is quick is another a frame on."""
 
 SHARE, LEAST = 0.6, 2
 """Of a recording's moving windows, and how many, must be found again."""
