@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -74,12 +75,13 @@ def test_frames_may_be_piped_in_and_a_bad_one_harms_itself_alone(live: Live, tmp
 
 @pytest.mark.slow
 def test_the_whole_chain_at_the_pace_of_life(live: Live) -> None:
-    """A service, the sample, and a robot: speech while joy is weak, then a gesture when it is strong, then speech."""
+    """A service, the sample, and a robot: speech while joy is weak, then gestures while it is strong, then speech."""
     need_qi()
     with QiRobot(seconds=0.5) as robot:
         ran = run("--robot", robot.url, "--service", live.stream, "--play", SAMPLE, "--emotion", "joy")
         assert (ran.returncode, ran.stderr) == (0, "")
-        assert [call[1] for call in robot.calls() if call[1] in ("say", "run")] == ["say", "run", "say"]
+        done = [call[1] for call in robot.calls() if call[1] in ("say", "run")]
+    assert [what for what, _ in groupby(done)] == ["say", "run", "say"]
 
 
 def test_a_robot_is_told(live: Live, short: Path) -> None:
