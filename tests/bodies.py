@@ -8,7 +8,7 @@ from fervor.model import Model, default_model_path
 from fervor.protocol.messages import Limits, ModelInfo
 from fervor.session.body import Terms
 from fervor.session.events import Source
-from fervor.session.session import Host
+from fervor.session.host import Host
 from fervor.skeletons.catalog import skeleton
 
 

@@ -22,7 +22,7 @@ from fervor.server.sessions import Sessions
 from fervor.server.shedding import Shedding
 from fervor.server.tokens import Tokens
 from fervor.server.tracing import Tracing
-from fervor.session.session import Host
+from fervor.session.host import Host
 from fervor.settings import Settings
 
 OWN_BODIES = 1

@@ -5,13 +5,11 @@ every `Ticket` to the engine in order and hand each outcome to `conclude`; call 
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import partial
 
 from fervor.emotions import emotion_vector
 from fervor.errors import CheckpointUnknown, CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
-from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
@@ -22,8 +20,6 @@ from fervor.protocol.messages import (
     Estimates,
     Frame,
     Frames,
-    Limits,
-    ModelInfo,
     Ping,
     Pong,
     Resumed,
@@ -41,28 +37,10 @@ from fervor.session.calibrating import Calibrating
 from fervor.session.checkpoint import Bond, pack, unpack
 from fervor.session.events import Close, Event, Outcome, Pose, Reply, Restore, Ticket
 from fervor.session.groups import Groups
+from fervor.session.host import Host
 from fervor.session.roster import Roster
 from fervor.session.start import Agreement, agree
 from fervor.session.state import SessionState, transition
-from fervor.skeletons.skeleton import Skeleton
-
-
-@dataclass(frozen=True, slots=True)
-class Host:
-    """What a session must know of the service it runs in."""
-
-    model: ModelInfo
-    metadata: ModelMetadata
-    limits: Limits
-    fingerprint: str
-    claim: Callable[[], int]
-    """Takes a free slot of the engine; raises Overloaded."""
-    seal: Callable[[bytes], str] | None = None
-    """Signs a checkpoint; None on a service that gives none."""
-    unseal: Callable[[str], bytes] | None = None
-    """Opens a token; raises CheckpointUnknown."""
-    skeletons: Mapping[str, Skeleton] = field(default_factory=dict)
-    """Skeletons beside the catalogue's, by name: calibrations kept on this service."""
 
 
 class Session:
