@@ -23,7 +23,8 @@ def page(results: Results, material: Material, recipe: Recipe, variants: Mapping
         variants: by name.
         command: what was typed.
     """
-    seeds = len(results[BASE.name])
+    count = len(results[BASE.name])
+    seeds = f"{count} seeds" if count > 1 else "one seed"
     seen, test = len(material.learn) + len(material.validate), len(material.test)
     head = ["", *(measure.title for measure in MEASURES), "speaks for the default", "speaks against it"]
     rows = [f"| {' | '.join(head)} |", "|---|" + "---|" * (len(head) - 1)]
@@ -40,7 +41,7 @@ What each choice of the recipe `{recipe.name}` is worth: one row a choice, undon
 ```
 
 Data: {material.description}; {seen} clips to learn from and to choose the epoch by, judged by {test} clips of other
-actors. {recipe.epochs} epochs, {seeds} seeds, the same split for all. That is little: small differences are chance, and
+actors. {recipe.epochs} epochs, {seeds}, the same split for all. That is little: small differences are chance, and
 what needs long training to pay shows less than it would.
 
 Cells: mean ± standard deviation over seeds. All r are within emotion, of a clip's mean estimate after its first second.

@@ -1,4 +1,7 @@
-"""How a network is trained: the paper's recipe, and the default, whose every difference has its reason beside it."""
+"""How a network is trained: the paper's recipe, and the default, whose every difference has its reason beside it.
+
+What each choice was found to be worth: docs/reference/ablation.md, written by `fervor ablate`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
