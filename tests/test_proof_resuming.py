@@ -94,6 +94,7 @@ class Entry:
     """A message that may have to be sent again."""
 
     message: Frame | BodyReset | BodyEnd | SessionCalibrate
+    repeats: bool = False
     answered: bool = False
 
     @property
@@ -137,11 +138,12 @@ class Client:
 
     def sends(self, message) -> None:
         for part in message.frames if isinstance(message, Frames) else [message]:
+            repeats = isinstance(part, Frame) and (part.body, part.seq) in self._lives
             if isinstance(part, Frame):
                 self._appears(part)
                 self._lives.setdefault((part.body, part.seq), self.bodies[part.body].life)
                 self.asked.append(self.key(part.body, part.seq))
-            self.log.append(Entry(part))
+            self.log.append(Entry(part, repeats))
             if isinstance(part, BodyEnd):
                 self._gone(part.body)
 
@@ -226,7 +228,8 @@ class Client:
         if message.seq != kept.covers or not kept.token:
             mine = [entry for entry in self.log if entry.body == message.body]
             mine = [entry for entry in mine if not isinstance(entry.message, SessionCalibrate)]
-            place = next((at for at, entry in enumerate(mine) if entry.seq == message.seq), -1)
+            named = (at for at, entry in enumerate(mine) if entry.seq == message.seq and not entry.repeats)
+            place = next(named, -1)  # a frame that was sent again is not the one that a checkpoint names
             covered = mine[: place + 1]
             assert all(entry.answered or entry.seq is None or self._skips for entry in covered), "answers come first"
             self._drop(lambda entry: entry in covered)
