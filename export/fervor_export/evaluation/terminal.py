@@ -34,7 +34,7 @@ def _papers(result: Evaluation) -> Table:
     for protocol in result.protocols:
         both = (_interval(protocol.predictor(name).scores.r_all) for name in (NETWORK, BASELINE))
         table.add_row(protocol.title, *both, _number(protocol.ceilings.r_all))
-    table.add_row("[dim]the paper, 5 folds, EBMDB[/]", *(f"[dim]{PAPER[name]}[/]" for name in (NETWORK, BASELINE)), "")
+    table.add_row("[dim]the paper, 5 folds[/]", *(f"[dim]{PAPER[name]}[/]" for name in (NETWORK, BASELINE)), "")
     return table
 
 
