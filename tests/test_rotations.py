@@ -209,7 +209,7 @@ def test_the_smallest_turn_between_two_directions(a: Array, b: Array) -> None:
     assert np.allclose(rot.rotate(turn, a), b, atol=1e-4 if np.dot(a, b) < -0.999999 else 1e-9)
 
 
-@pytest.mark.parametrize("direction", [[0.0, 1, 0], [1.0, 0, 0], [0.0, 0, 1], [0.6, 0.8, 0]])
+@pytest.mark.parametrize("direction", [[0.0, 1, 0], [1.0, 0, 0], [0.0, 0, 1], [0.6, 0.8, 0], [0.48, 0.64, 0.6]])
 def test_the_turn_between_opposite_directions_is_half_a_turn(direction: list[float]) -> None:
     a = np.array(direction)
     assert np.allclose(rot.rotate(rot.between(a, -a), a), -a, atol=1e-12)

@@ -219,17 +219,18 @@ def from_xyzw(q: npt.NDArray[F], order: str) -> npt.NDArray[F]:
 def between(a: npt.NDArray[F], b: npt.NDArray[F]) -> npt.NDArray[F]:
     """The smallest turns that take unit vectors a to unit vectors b, both [..., 3].
 
-    Opposite vectors leave the axis open: then a half turn about Z, or about X where the vectors lie along Z.
+    Opposite vectors leave the axis open: then a half turn about what of Z is across them, or about X where they lie
+    along Z.
     """
-    ax, ay, _ = _parts(a)
+    ax, ay, az = _parts(a)
     x, y, z = _parts(cross(a, b))
     w = 1.0 + dot(a, b)
     opposite = w < 1e-9
     along_z = ax * ax + ay * ay < 1e-9
     one, zero = w.dtype.type(1.0), w.dtype.type(0.0)
-    x = np.where(opposite, np.where(along_z, one, zero), x)
-    y = np.where(opposite, zero, y)
-    z = np.where(opposite, np.where(along_z, zero, one), z)
+    x = np.where(opposite, np.where(along_z, one, -az * ax), x)
+    y = np.where(opposite, np.where(along_z, zero, -az * ay), y)
+    z = np.where(opposite, np.where(along_z, zero, ax * ax + ay * ay), z)
     return normalise(_join(x, y, z, np.where(opposite, zero, w)))
 
 
