@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import queue
+import random
 import signal
 import socket
 import subprocess
@@ -37,6 +38,13 @@ def need_qi() -> None:
         pytest.skip("qi is not installed")
 
 
+def free_port() -> int:
+    """A free port that no outgoing connection is given, so that a robot that was killed can have it again."""
+    while True:
+        with suppress(OSError), socket.create_server(("127.0.0.1", random.randrange(20_000, 32_000))) as probe:
+            return int(probe.getsockname()[1])
+
+
 class QiRobot:
     """The process, seen from the test. Use it in a `with`; `kill` and `start` it at will."""
 
@@ -49,8 +57,7 @@ class QiRobot:
         bare: bool = False,
     ) -> None:
         """`seconds`: how long speech and gestures take. `bare`: services have no methods but say and run."""
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self.url = f"tcp://127.0.0.1:{self.port}"
         self._options = {"services": services, "animations": animations, "seconds": seconds, "bare": bare}
         self._calls: queue.SimpleQueue[list[Any] | None] = queue.SimpleQueue()
