@@ -134,6 +134,6 @@ def followed(model: Model, cuts: list[Cut]) -> dict[str, Row]:
 def test_estimates_follow_edits_of_real_motion(followed, emotion):
     """Towards what studies describe; nobody has rated it."""
     row = followed[emotion]
-    assert row.ordered > 0.7  # 0.5 is chance
+    assert row.ordered > 0.8  # 0.5 is chance
     assert row.rank_r > 0.15
     assert row.high - row.low > 0.15  # not constant
