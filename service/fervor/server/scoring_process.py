@@ -114,6 +114,8 @@ class ScoringProcess:
             return Overloaded(f"the request took longer than {self._timeout_s:g} s, and was given up")
 
     async def _ask(self, question: bytes) -> bytes | FervorError:
+        if self._process is not None and self._process.returncode is not None:
+            await self._discard()  # it died between two requests, which need not cost either
         process = self._process or await self._start()
         assert process.stdout is not None
         try:
@@ -147,8 +149,11 @@ class ScoringProcess:
 
 async def _write(process: Process, content: bytes) -> None:
     assert process.stdin is not None
-    process.stdin.write(LENGTH.pack(len(content)) + content)
-    await process.stdin.drain()
+    try:
+        process.stdin.write(LENGTH.pack(len(content)) + content)
+        await process.stdin.drain()
+    except RuntimeError as problem:  # uvloop's word for a pipe that is closed already
+        raise BrokenPipeError(str(problem)) from problem
 
 
 def _kill(process: Process) -> None:
