@@ -103,7 +103,7 @@ def _trunk(frames: _Frames) -> _Trunk:
         0.55 * (lean + moved[:, Torso.SPINE.start] + moved[:, Torso.THORAX.start] + 0.2 * scene.pelvis) + 0.25 * slump
     )
     head += moved[:, Torso.HEAD] + 1.6 * sway[:, 6:9] * (person.nod * style["nod"][:, None]) ** 0.5 + 1.6 * fine[:, 2]
-    head[:, 0] += person.head + style["head"] - level - 0.3 * bounce + 1.8 * shake - 0.9 * rock
+    head[:, 0] += person.head + scene.look + style["head"] - level - 0.3 * bounce + 1.8 * shake - 0.9 * rock
     head[:, 1] += person.turn[0] + scene.gaze + script.way * style["aside"] - 0.6 * (spine[:, 1] + chest[:, 1])
     head[:, 2] += person.turn[1] + script.way * style["tilt"] - 0.4 * (spine[:, 2] + chest[:, 2])
     turns = rotations.from_euler("YXZ", _limit(angles)[..., [1, 0, 2]])
@@ -198,7 +198,7 @@ def _swing(frames: _Frames) -> Array:
     swing = style["swing"] * person.size**0.7 * frames.script.scene.drive
     amplitude = np.radians(np.minimum(20.0 * swing * style["stride"], 65.0))[:, None]
     angle = amplitude * (wave + 0.15 * frames.walking)
-    bent = 0.11 * np.minimum(swing, 2.2)[:, None] * np.maximum(wave + 0.4 * frames.walking, 0.0)
+    bent = 0.05 * np.minimum(swing, 2.2)[:, None] ** 1.5 * np.maximum(wave + 0.2 * frames.walking, 0.0)
     return np.stack((-0.02 * wave, length * (1.0 - np.cos(angle)) + bent, length * np.sin(angle)), axis=-1)
 
 

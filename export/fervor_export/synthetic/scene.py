@@ -15,7 +15,7 @@ K = TypeVar("K", bound=str)
 Posture = Literal["sit", "stand", "walk"]
 Activity = Literal["talk", "act", "task", "dance", "listen"]
 
-POSTURES: dict[Posture, float] = {"stand": 0.42, "sit": 0.40, "walk": 0.18}
+POSTURES: dict[Posture, float] = {"stand": 0.40, "sit": 0.38, "walk": 0.22}
 ACTIVITIES: dict[Posture, dict[Activity, float]] = {
     "stand": {"talk": 0.38, "act": 0.30, "task": 0.12, "dance": 0.08, "listen": 0.12},
     "sit": {"talk": 0.50, "act": 0.28, "task": 0.08, "dance": 0.0, "listen": 0.14},
@@ -32,6 +32,9 @@ EMBLEM: dict[Activity, float] = {"talk": 0.75, "act": 1.0, "task": 0.25, "dance"
 SEEN: dict[Activity, float] = {"talk": 1.0, "act": 1.0, "task": 0.9, "dance": 0.8, "listen": 0.25}
 """0..1, how much a viewer can read from its gestures."""
 
+LOOK: dict[Posture, tuple[float, float]] = {"stand": (0.0, 3.0), "sit": (0.0, 3.0), "walk": (8.0, 7.0)}
+"""Degrees, mean and standard deviation: how far down people look while they do nothing else."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scene:
@@ -46,6 +49,7 @@ class Scene:
     knee: tuple[float, float]  # left, right
     rest: float  # drawn in 0..1: which resting pose
     gaze: float  # head yaw towards the partner
+    look: float  # head pitch towards what is looked at: walkers mostly look at the ground ahead
     pace: float  # x, how fast and far a walker steps
     drive: float  # x, how far a walker's arms swing
     feet: float  # x, how restless standing feet are
@@ -68,7 +72,7 @@ class Scene:
         pace, drive, feet = np.exp(rng.normal(0.0, (0.18, 0.35, 0.6))).tolist()
         return cls(
             posture, activity, float(np.exp(rng.normal(0.0, 0.25))), pelvis, thigh_pair, spread_pair, knee_pair,
-            float(rng.random()), float(rng.normal(0.0, 8.0)),
+            float(rng.random()), float(rng.normal(0.0, 8.0)), float(rng.normal(*LOOK[posture])),
             pace, pace * drive, feet,
         )  # fmt: skip
 
