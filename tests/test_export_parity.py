@@ -8,7 +8,8 @@ import torch
 from fervor.errors import ModelFileError
 from fervor.model import Model
 from fervor_export.export import export_model, library_versions
-from fervor_export.parity import TOLERANCE, check_parity, edge_rotations
+from fervor_export.graph import build_model
+from fervor_export.parity import MOST, TOLERANCE, check_parity, edge_rotations
 from networks import CONFIGS, DEFAULT, metadata, model_bytes, network
 
 
@@ -30,6 +31,20 @@ def test_a_single_weight_is_seen():
     with torch.no_grad():
         changed.lstm2.weight_hh_l0[3, 5] += 1e-2
     assert not check_parity(changed, Model.load(model_bytes())).agrees
+
+
+def test_a_steep_network_is_held_to_what_float32_can_give():
+    trained = network()
+    with torch.no_grad():
+        for lstm in (trained.lstm1, trained.lstm2):
+            lstm.weight_ih_l0 *= 2
+            lstm.weight_hh_l0 *= 2
+    file = Model.load(build_model(trained, metadata()).SerializeToString())
+    report = check_parity(trained, file)
+    assert TOLERANCE < report.largest <= report.allowed <= MOST
+    with torch.no_grad():
+        trained.lstm2.weight_hh_l0[3, 5] += 1e-2
+    assert not check_parity(trained, file).agrees
 
 
 def test_not_a_number_is_no_agreement():

@@ -17,7 +17,7 @@ from fervor.skeletons.rig import JOINTS, PARENTS
 from fervor_export.checkpoint import TrainedNetwork
 from fervor_export.graph import build_model
 from fervor_export.network import Network
-from fervor_export.parity import TOLERANCE, ParityReport, check_parity
+from fervor_export.parity import ParityReport, check_parity
 
 
 def export_model(network: Network, metadata: ModelMetadata, path: Path) -> ParityReport:
@@ -25,7 +25,7 @@ def export_model(network: Network, metadata: ModelMetadata, path: Path) -> Parit
 
     Raises:
         ModelFileError: metadata and network differ, or the file's results differ from the network's by more than
-            `parity.TOLERANCE`; then `path` is as it was.
+            `parity` allows; then `path` is as it was.
     """
     _check_contract(network, metadata)
     content = build_model(network, metadata).SerializeToString(deterministic=True)
@@ -33,7 +33,7 @@ def export_model(network: Network, metadata: ModelMetadata, path: Path) -> Parit
     if not report.agrees:
         raise ModelFileError(
             f"{path} was not written: results would differ from the network's by {report.largest:.2g} "
-            f"({report.where}); allowed is {TOLERANCE:g}"
+            f"({report.where}); allowed is {report.allowed:.2g}"
         )
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(path.name + ".part")
