@@ -16,8 +16,7 @@ from fervor_export.weights import network_from_model_file
 PLAIN = ("amusement", "anger", "disgust", "fear", "joy", "pride", "sadness", "shame")
 """Emotions whose display in generated motion is hard to miss; relief and surprise are short events."""
 
-FOLLOWED = ("joy", "anger", "fear", "pride", "sadness", "shame")
-"""Emotions whose estimates follow edits of real motion; the model card has the figures of all."""
+FELT = tuple(emotion for emotion in EMOTIONS if emotion != "neutral")
 
 
 @pytest.fixture(scope="module")
@@ -130,10 +129,15 @@ def followed(model: Model, cuts: list[Cut]) -> dict[str, Row]:
     return {row.emotion: row for row in measure(model, cuts)}
 
 
-@pytest.mark.parametrize("emotion", FOLLOWED)
+@pytest.mark.parametrize("emotion", FELT)
 def test_estimates_follow_edits_of_real_motion(followed, emotion):
-    """Towards what studies describe; nobody has rated it."""
+    """Towards what studies describe; nobody has rated it. The model card has the figures."""
     row = followed[emotion]
-    assert row.ordered > 0.8  # 0.5 is chance
-    assert row.rank_r > 0.15
+    assert row.ordered > 0.7  # 0.5 is chance
+    assert row.rank_r > 0.1
     assert row.high - row.low > 0.15  # not constant
+
+
+def test_most_edits_are_followed(followed):
+    assert np.mean([followed[emotion].ordered for emotion in FELT]) > 0.85
+    assert np.mean([followed[emotion].rank_r for emotion in FELT]) > 0.3
