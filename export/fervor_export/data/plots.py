@@ -12,23 +12,15 @@ from matplotlib.figure import Figure
 
 from fervor.emotions import EMOTIONS
 from fervor.skeletons.rig import JOINTS
+from fervor.skeletons.standard_body import LIMBS, points
 from fervor_export.clip import Clip
 from fervor_export.data.dataset import Dataset, Take
 from fervor_export.data.label import NEUTRAL
-from fervor_export.evaluation.standard_body import MIDHIP, points
 
 _INK = "#3b5b92"
 
 MOST_SKELETONS = 4
 """Kinds of skeletons that are drawn."""
-
-LINES = (
-    (MIDHIP, "spine"), ("spine", "spine_mid"), ("spine_mid", "neck"), ("neck", "head"),
-    *((f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in (
-        ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "index"), ("hip", "knee"), ("knee", "ankle"))),
-    *((middle, f"{side}_{end}") for side in "lr" for middle, end in (("neck", "shoulder"), (MIDHIP, "hip"))),
-)  # fmt: skip
-"""Bones that are drawn, by their ends."""
 
 MOST_ACTORS = 40
 """Actors that are shown one by one."""
@@ -75,7 +67,7 @@ def _poses(takes: Sequence[Take]) -> str:
 
 def _draw_body(axes: Axes, at: Mapping[str, tuple[float, float]]) -> None:
     """Bones between points in metres, the left ones orange."""
-    for start, end in LINES:
+    for start, end in LIMBS:
         side = "#E69F00" if end.startswith("l_") else _INK
         (x, y), (u, v) = at[start], at[end]
         axes.plot([x, u], [y, v], color=side, linewidth=2, solid_capstyle="round", marker="o", ms=3)

@@ -19,9 +19,9 @@ from fervor.skeletons.catalog import skeleton
 from fervor.skeletons.landmarks import LANDMARKS, POINTS
 from fervor.skeletons.positions import local_over_time
 from fervor.skeletons.rig import JOINTS, SEGMENTS, mirror_pose
+from fervor.skeletons.standard_body import points, segments
 from fervor_export.clip import RATE_HZ
 from fervor_export.evaluation.estimator import Motion
-from fervor_export.evaluation.standard_body import points, segments
 
 Floats = npt.NDArray[np.float64]
 See = Callable[[Motion, np.random.Generator], Motion]

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import savgol_filter
 
+from fervor.skeletons.standard_body import MIDHIP, points
 from fervor_export.clip import RATE_HZ, Clip
-from fervor_export.evaluation.standard_body import MIDHIP, points
 
 Floats = npt.NDArray[np.float64]
 

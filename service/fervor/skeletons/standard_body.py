@@ -1,9 +1,9 @@
 """A standard body: where the joints are in space, worked out from rig rotations (forward kinematics).
 
-Handcrafted features are about positions, rotations are what a clip has; so every clip is put on one body. Bones are a
-1.70 m adult's (Winter 2009, Biomechanics and Motor Control of Human Movement, table 4.1 and figure 4.1, shares of the
-height; trunk split at L4/L5 and T12). Axes of the rig: X left, Y up, Z forward; the pelvis is upright at the origin,
-as the rig has no root.
+Pictures and handcrafted features are about positions, rotations are what a pose has; so every pose is put on one
+body. Bones are a 1.70 m adult's (Winter 2009, Biomechanics and Motor Control of Human Movement, table 4.1 and figure
+4.1, shares of the height; trunk split at L4/L5 and T12). Axes of the rig: X left, Y up, Z forward; the pelvis is
+upright at the origin, as the rig has no root.
 """
 
 from collections.abc import Mapping
@@ -36,6 +36,14 @@ BONES: Mapping[str, tuple[str, str, tuple[float, float, float]]] = {
 """Point: from which point ("" the middle of the hips), with which segment, and where (metres; left, up, forward)."""
 
 MIDHIP = "midhip"
+
+LIMBS = (
+    (MIDHIP, "spine"), ("spine", "spine_mid"), ("spine_mid", "neck"), ("neck", "head"),
+    *((f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in (
+        ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "index"), ("hip", "knee"), ("knee", "ankle"))),
+    *((middle, f"{side}_{end}") for side in "lr" for middle, end in (("neck", "shoulder"), (MIDHIP, "hip"))),
+)  # fmt: skip
+"""What is drawn of a body: lines, by their ends."""
 
 
 def points(

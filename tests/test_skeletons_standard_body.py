@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fervor.skeletons.rig import CHILD_SEGMENT, JOINTS, PARENT_SEGMENT, SEGMENTS
-from fervor_export.evaluation.standard_body import BONES, MIDHIP, points, segments
+from fervor.skeletons.standard_body import BONES, MIDHIP, points, segments
 
 REST = np.tile([0.0, 0.0, 0.0, 1.0], (1, 13, 1))
 
