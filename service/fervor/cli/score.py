@@ -11,12 +11,13 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from fervor.cli.picture.album import Album
 from fervor.cli.reports import Format, choose_format, show_table, write_report
 from fervor.cli.scorers import Here, Remote
 from fervor.emotions import emotion_vector
 from fervor.errors import InputError
 from fervor.protocol.messages import Clock, Memory
-from fervor.server.scoring_models import FileOptions, ScoreResponse, SequenceScore
+from fervor.server.scoring_models import Detail, FileOptions, ScoreResponse, SequenceScore
 
 
 def score(
@@ -30,6 +31,7 @@ def score(
     as_csv: Annotated[bool, typer.Option("--csv", help="Write CSV.")] = False,
     frames: Annotated[bool, typer.Option("--frames", help="With --json or --csv: every estimate.")] = False,
     out: Annotated[Path | None, typer.Option(help="Write to this file; its name may say .json or .csv.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Draw intensity and poses of each file on this HTML page.")] = None,
     memory: Annotated[Memory, typer.Option(help="How long the network remembers.")] = "staggered",
     clock: Annotated[Clock, typer.Option(help="`frames`: each frame is one step, whatever its time.")] = "time",
     model: Annotated[Path | None, typer.Option(help="Model file; default: the model of fervor.")] = None,
@@ -43,12 +45,18 @@ def score(
     if url and model:
         raise typer.BadParameter("the service at --url has a model of its own", param_hint="--model")
     emotion_vector(emotion)
-    options = FileOptions(
-        clock=clock, memory=memory, detail="frames" if frames else "summary", emotion=emotion, skeleton=skeleton
-    )
+    detail: Detail = "frames" if frames or html else "summary"
+    options = FileOptions(clock=clock, memory=memory, detail=detail, emotion=emotion, skeleton=skeleton)
     scorer = Remote(url, options, token) if url else Here(model, options)
+    album = Album(html, skeleton=skeleton, hysteresis=scorer.hysteresis) if html else None
     failures: list[InputError] = []
-    scores = list(_score_all(scorer, files, failures))
+    scores = []
+    for file, scored in _score_all(scorer, files, failures):
+        if album:
+            album.add(scored, file, scorer.model)
+        scores.append(scored if frames else scored.model_copy(update={"estimates": None}))
+    if album and scores:
+        album.write(scorer.model)
     if scores:
         report = ScoreResponse(model=scorer.model, fingerprint=scorer.fingerprint, sequences=tuple(scores))
         if written is not Format.TABLE:
@@ -59,7 +67,9 @@ def score(
         raise typer.Exit(failures[0].exit_code)
 
 
-def _score_all(scorer: Here | Remote, files: list[Path], failures: list[InputError]) -> Iterator[SequenceScore]:
+def _score_all(
+    scorer: Here | Remote, files: list[Path], failures: list[InputError]
+) -> Iterator[tuple[Path, SequenceScore]]:
     """Score file after file; one that can't be used is told and noted in `failures`."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
@@ -68,7 +78,7 @@ def _score_all(scorer: Here | Remote, files: list[Path], failures: list[InputErr
         for file in files:
             progress.update(task, description=file.name)
             try:
-                yield scorer.score(file)
+                yield file, scorer.score(file)
             except InputError as error:
                 failures.append(error)
                 console.print(f"fervor: {error.message}", markup=False, highlight=False, soft_wrap=True)

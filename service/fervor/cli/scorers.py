@@ -8,6 +8,7 @@ from urllib.request import Request, urlopen
 
 from pydantic import ValidationError
 
+from fervor.cli.picture.rule import hysteresis_at
 from fervor.cli.recordings import find_skeleton, read
 from fervor.errors import AuthError, FervorError, InputError, Overloaded, RequestError, Unreachable
 from fervor.model import Model, check_row_independence, default_model_path
@@ -30,6 +31,7 @@ class Here:
         self.model: ModelInfo = model_info(loaded)
         self.fingerprint = loaded.fingerprint
         self._metadata = loaded.metadata
+        self.hysteresis: float | None = loaded.metadata.levels.hysteresis
         self._scorer = Scorer(loaded, row_multiple=check_row_independence(loaded))
         self._options = options
 
@@ -55,7 +57,8 @@ class Remote:
             raise InputError(
                 f"a service takes no file {options.skeleton!r}; expected the name of a skeleton it keeps (--skeletons)"
             )
-        self._url = f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}/v1/score/file"
+        self._base = f"{parts.scheme}://{parts.netloc}{parts.path.rstrip('/')}"
+        self._url = f"{self._base}/v1/score/file"
         self._options = options
         self._token = token
         self._answer: ScoreResponse | None = None
@@ -71,6 +74,11 @@ class Remote:
         """Its fingerprint."""
         assert self._answer is not None
         return self._answer.fingerprint
+
+    @property
+    def hysteresis(self) -> float | None:
+        """Half-width of the band in which its levels stay; None where the service does not tell."""
+        return hysteresis_at(self._base, self._token)
 
     def score(self, file: Path) -> SequenceScore:
         """The score of one file, named as it was given.

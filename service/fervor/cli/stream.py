@@ -11,6 +11,7 @@ import typer
 import fervor_client
 from fervor.cli.local import own_service
 from fervor.cli.main import BROKEN_PIPE, INTERRUPTED
+from fervor.cli.picture.plot import Plot
 from fervor.cli.playing import Take, play
 from fervor.cli.recordings import read
 from fervor.cli.screens import Complaints, pick_screen, say
@@ -42,12 +43,16 @@ def stream(
     fast: Annotated[bool, typer.Option("--fast", help="As fast as the service answers.")] = False,
     json: Annotated[bool, typer.Option("--json", help="One line of JSON an estimate, nothing else.")] = False,
     loop: Annotated[bool, typer.Option("--loop", help="Over and over, until Ctrl-C.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw intensity and poses to this PNG or SVG file, at the end or at Ctrl-C.")
+    ] = None,
 ) -> None:
     """Stream a recording at its own pace and watch the intensity move.
 
     Estimates go to standard output: as a live meter on a terminal, as plain lines into a pipe or file.
     """
     take = Take.of(read(file, skeleton=skeleton))
+    drawing = Plot(plot, take.name) if plot else None
 
     async def run(address: str) -> None:
         async with fervor_client.connect(
@@ -60,10 +65,16 @@ def stream(
             retry_for=RETRY_S,
         ) as session:
             duration = None if loop else take.duration_s
-            with pick_screen(take.name, session.model, duration_s=duration, json=json) as screen:
-                await play(session, take.frames(loop=loop), screen, body=body, fast=fast)
+            frames = take.frames(loop=loop)
+            screen = pick_screen(take.name, session.model, duration_s=duration, json=json)
+            if drawing:
+                frames, screen = drawing.watch(frames), drawing.beside(screen, session.model)
+            with screen:
+                await play(session, frames, screen, body=body, fast=fast)
 
-    with interruptible(), service_at(url, token) as address:
+    with interruptible(), service_at(url, token) as address, drawing or contextlib.nullcontext():
+        if drawing:
+            drawing.ask_for_rule(address, token)
         asyncio.run(run(address))
 
 
