@@ -103,6 +103,8 @@ def test_a_file_to_write_to(good: Path, tmp_path: Path, capsys: pytest.CaptureFi
         (["--json", "--csv"], 2, "only one of --json and --csv"),
         (["--frames"], 2, "a table has no place for every frame"),
         (["--out", "scores.xls"], 2, "says no format"),
+        (["--html", "scores.png"], 2, "must end in .html"),
+        (["--html", "/no/such/folder/scores.html"], 73, "can't be written: its folder is not there"),
         (["--out", "/no/such/folder/scores.csv"], 73, "can't be written: No such file or directory"),
         (["--model", "none.onnx"], 65, "none.onnx can't be read as a model file"),
         (["--url", "http://x", "--model", "a.onnx"], 2, "has a model of its own"),
@@ -126,6 +128,25 @@ def test_clock_and_memory_matter(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert len(set(scores)) == len(scores)
 
 
+def test_a_page_of_pictures_for_what_can_be_read(
+    good: Path, bad: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "scores.html"
+    assert run(["score", str(good), str(bad), str(good), "--emotion", "joy", "--html", str(out)]) == 65
+    page = out.read_text(encoding="utf-8")
+    assert page.count("<svg") == 2
+    assert "bad.bvh" not in page
+    assert "good.bvh" in capsys.readouterr().out  # the table stays
+
+
+def test_a_page_changes_no_other_output(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for how in (["--json"], ["--csv"], ["--json", "--frames"]):
+        assert run(["score", str(good), *how]) == 0
+        plain = capsys.readouterr().out
+        assert run(["score", str(good), *how, "--html", str(tmp_path / "scores.html")]) == 0
+        assert capsys.readouterr().out == plain
+
+
 # --- by a service -----------------------------------------------------------------------------------------------------
 
 
@@ -135,6 +156,13 @@ def test_a_service_gives_the_same_score(live: Live, good: Path, capsys: pytest.C
     here = json.loads(capsys.readouterr().out)
     assert run([*given, "--url", live.url]) == 0
     assert json.loads(capsys.readouterr().out) == here
+
+
+def test_a_service_gives_the_same_page(live: Live, good: Path, tmp_path: Path) -> None:
+    here, there = tmp_path / "here.html", tmp_path / "there.html"
+    assert run(["score", str(good), "--emotion", "joy", "--html", str(here)]) == 0
+    assert run(["score", str(good), "--emotion", "joy", "--html", str(there), "--url", live.url]) == 0
+    assert here.read_bytes() == there.read_bytes()
 
 
 def test_a_service_tells_of_a_broken_file(

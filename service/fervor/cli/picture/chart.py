@@ -1,10 +1,10 @@
 """The chart of a recording: intensity over time with the threshold, and ribbons of level, emotion and status."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from fervor.cli.meter import threshold
@@ -18,25 +18,30 @@ MOST_POINTS = 1500
 LETTER = 0.075
 """Width of a letter of a ribbon's text, inches: enough for the widest words."""
 
+LINE = 0.13
+"""Height of a line of text, inches."""
+
+LEAST = 0.03
+"""Width that can still be seen, inches: that of a single frame."""
+
 RIBBONS = ("level", "emotion", "status")
 
 
-def draw_intensity(axes: Axes, trace: Trace) -> None:
+def draw_intensity(axes: Axes, trace: Trace, *, inches_per_second: float) -> None:
     """The curve, coloured by its level, over the threshold and its band."""
     curve = trace.curve
     _draw_threshold(axes, trace, curve)
-    for gap in gaps(curve):
-        axes.axvspan(gap.start, gap.end, facecolor=LIGHT.ribbon, edgecolor=LIGHT.rule, hatch="////", linewidth=0)
-        middle = (gap.start + gap.end) / 2
-        axes.text(middle, 0.5, gap.text, rotation=90, ha="center", va="center", fontsize=7.5, color=LIGHT.quiet)
-    for stretch in stretches(curve):
-        for level, colour in (("weak", LIGHT.weak), ("strong", LIGHT.strong)):
-            times, values, mine = _points(stretch, level)
-            axes.fill_between(times, 0.0, values, where=list(mine), color=colour, alpha=0.28, linewidth=0)
-        times, values, _ = _points(stretch)
-        axes.plot(times, values, color=LIGHT.ink, linewidth=1.3, solid_joinstyle="round")
-        if len(stretch) == 1:  # a line of one point can't be seen
-            axes.plot(times, values, color=LIGHT.ink, marker="o", markersize=3)
+    _draw_gaps(axes, gaps(curve), inches_per_second)
+    kept = _points(curve)
+    times = np.asarray([np.nan if one is None else one.t for one in kept])
+    values = np.asarray([np.nan if one is None or one.intensity is None else one.intensity for one in kept])
+    for level, colour in (("weak", LIGHT.weak), ("strong", LIGHT.strong)):
+        mine = np.asarray([one is not None and level_of(one) == level for one in kept])
+        mine[1:] |= mine[:-1]  # a colour reaches up to where the next begins
+        axes.fill_between(times, 0.0, values, where=list(mine), color=colour, alpha=0.28, linewidth=0)
+    axes.plot(times, values, color=LIGHT.ink, linewidth=1.3, solid_joinstyle="round")
+    lone = [stretch[0] for stretch in stretches(curve) if len(stretch) == 1 and stretch[0].intensity is not None]
+    axes.plot([one.t for one in lone], [one.intensity for one in lone], ".", color=LIGHT.ink, markersize=4)
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([0.0, 0.5, 1.0])
     axes.set_ylabel("intensity")
@@ -68,12 +73,10 @@ def draw_ribbons(axes: Axes, trace: Trace, *, inches_per_second: float) -> None:
     curve = trace.curve
     said = zip(RIBBONS, (level_of, emotion_of, status_of), strict=True)
     for row, (kind, of) in enumerate(said):
-        place = len(RIBBONS) - 1 - row
         found = [*spans(curve, of), *(gaps(curve) if kind == "status" else ())]
-        found.sort(key=lambda span: _colour(kind, span.text) == LIGHT.odd)  # short ones must not be covered
-        roomy = [_draw_span(axes, span, place, _colour(kind, span.text), inches_per_second) for span in found]
+        untold = _draw_ribbon(axes, kind, found, len(RIBBONS) - 1 - row, inches_per_second)
         if kind != "emotion":  # emotions have no colours of their own
-            _add_to_legend(axes, kind, [span.text for span, fits in zip(found, roomy, strict=True) if not fits])
+            _add_to_legend(axes, kind, untold)
     axes.set_ylim(-0.08, len(RIBBONS))
     axes.set_yticks([len(RIBBONS) - 0.54 - row for row in range(len(RIBBONS))], RIBBONS)
     axes.tick_params(axis="y", length=0)
@@ -100,13 +103,14 @@ def _add_to_legend(axes: Axes, kind: str, texts: Sequence[str]) -> None:
 def _draw_threshold(axes: Axes, trace: Trace, curve: Sequence[Estimate]) -> None:
     """From where on an intensity is strong: the threshold of the emotion in force."""
     labels = spans(curve, emotion_of)
-    for label in labels:
-        mark = threshold(trace.model, label.text)
-        if trace.hysteresis:
-            low, high = mark - trace.hysteresis, mark + trace.hysteresis
-            axes.fill_between([label.start, label.end], low, high, color=LIGHT.ribbon, linewidth=0, zorder=0.2)
-        axes.hlines(mark, label.start, label.end, color=LIGHT.quiet, linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=1.5)
-    mark = threshold(trace.model, labels[-1].text)
+    marks = np.asarray([threshold(trace.model, label.text) for label in labels])
+    starts, ends = (np.asarray([getattr(label, side) for label in labels]) for side in ("start", "end"))
+    if trace.hysteresis:
+        times = np.stack([starts, ends, np.full(len(labels), np.nan)], axis=1).ravel()  # apart from one another
+        low, high = (np.repeat(marks + sign * trace.hysteresis, 3) for sign in (-1, 1))
+        axes.fill_between(times, low, high, color=LIGHT.ribbon, linewidth=0, zorder=0.2)
+    axes.hlines(marks, starts, ends, color=LIGHT.quiet, linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=1.5)
+    mark = float(marks[-1])
     band = f"\n± {trace.hysteresis:g}" if trace.hysteresis else ""
     text = f"strong from\n{mark:.2f}{band}"
     axes.annotate(
@@ -115,16 +119,27 @@ def _draw_threshold(axes: Axes, trace: Trace, curve: Sequence[Estimate]) -> None
     )  # fmt: skip
 
 
-def _points(
-    stretch: Sequence[Estimate], level: str | None = None
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-    """Times and intensities [point] of a stretch, NaN without a pose, and where its level is `level` [point]."""
-    kept = thinned([estimate.intensity for estimate in stretch], MOST_POINTS)
-    times = np.asarray([stretch[at].t for at in kept])
-    values = np.asarray([np.nan if stretch[at].intensity is None else stretch[at].intensity for at in kept], float)
-    mine = np.asarray([str(stretch[at].level) == level for at in kept])
-    mine[1:] |= mine[:-1]  # a colour reaches up to where the next begins
-    return times, values, mine
+def _draw_gaps(axes: Axes, found: Sequence[Span], inches_per_second: float) -> None:
+    """Where no frame came; with its length, where there is room for a line of text."""
+    ranges = [(gap.start, gap.end - gap.start) for gap in found]
+    axes.broken_barh(ranges, (0.0, 1.0), facecolor=LIGHT.ribbon, edgecolor=LIGHT.rule, hatch="////", linewidth=0)
+    for gap in found:
+        if (gap.end - gap.start) * inches_per_second >= LINE:
+            middle = (gap.start + gap.end) / 2
+            axes.text(middle, 0.5, gap.text, rotation=90, ha="center", va="center", fontsize=7.5, color=LIGHT.quiet)
+
+
+def _points(curve: Sequence[Estimate]) -> list[Estimate | None]:
+    """The estimates to draw, with None where the line breaks."""
+    kept: list[Estimate | None] = []
+    drawn = [curve[at] for at in thinned([one.intensity for one in curve], MOST_POINTS)]
+    breaks = [gap.end for gap in gaps(curve)]
+    for one in drawn:
+        if breaks and one.t >= breaks[0]:
+            kept.append(None)
+            breaks = breaks[bisect_right(breaks, one.t) :]
+        kept.append(one)
+    return kept
 
 
 def thinned(values: Sequence[float | None], most: int) -> list[int]:
@@ -154,20 +169,27 @@ def _alpha(colour: str) -> float:
     return 0.6 if colour in (LIGHT.weak, LIGHT.strong, LIGHT.odd) else 1.0
 
 
-def _draw_span(axes: Axes, span: Span, place: int, colour: str, inches_per_second: float) -> bool:
-    """Draw one span; says whether its text found room."""
-    least = 0.03 / inches_per_second  # a single frame must be seen too
-    width = max(span.end - span.start, least)
-    gap = colour == LIGHT.paper
-    look: dict[str, Any] = {"edgecolor": LIGHT.paper, "linewidth": 0.7 if width > 2 * least else 0.0}
-    if gap:
-        look = {"edgecolor": LIGHT.rule, "linewidth": 0.0, "hatch": "////"}
-    axes.broken_barh([(span.start, width)], (place + 0.06, 0.8), facecolor=colour, alpha=_alpha(colour), **look)
-    roomy = len(span.text) * LETTER + 0.05 <= width * inches_per_second
-    if roomy:
-        box = {"boxstyle": "square,pad=0.1", "facecolor": LIGHT.paper, "linewidth": 0} if gap else None
+def _draw_ribbon(axes: Axes, kind: str, found: Sequence[Span], place: int, inches_per_second: float) -> list[str]:
+    """Draw the spans of one ribbon, colour by colour; gives the texts that found no room in their span."""
+    by_colour: dict[str, list[tuple[float, float]]] = {}
+    untold = []
+    for span in found:
+        width = max(span.end - span.start, LEAST / inches_per_second)
+        colour = _colour(kind, span.text)
+        by_colour.setdefault(colour, []).append((span.start, width))
+        if len(span.text) * LETTER + 0.05 > width * inches_per_second:
+            untold.append(span.text)
+            continue
+        box = {"boxstyle": "square,pad=0.1", "facecolor": LIGHT.paper, "linewidth": 0}
         axes.text(
             span.start + width / 2, place + 0.44, span.text, ha="center", va="center", fontsize=7.5, color=LIGHT.ink,
-            bbox=box,
+            bbox=box if colour == LIGHT.paper else None, zorder=4,
         )  # fmt: skip
-    return roomy
+    for colour, ranges in by_colour.items():
+        look: dict[str, Any] = {"edgecolor": LIGHT.paper, "linewidth": 0.5}
+        if colour == LIGHT.paper:
+            look = {"edgecolor": LIGHT.rule, "linewidth": 0.0, "hatch": "////"}
+        if colour == LIGHT.odd:  # short ones must not be covered
+            look |= {"linewidth": 0.0, "zorder": 2}
+        axes.broken_barh(ranges, (place + 0.06, 0.8), facecolor=colour, alpha=_alpha(colour), **look)
+    return untold

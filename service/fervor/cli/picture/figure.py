@@ -75,7 +75,7 @@ def _draw(trace: Trace, height: float, top: float) -> Figure:
     ribbons = panel(top + STRIP + SPACE + CURVE + SPACE, RIBBONS)
     seconds_per_metre = seconds / wide * STRIP / (HIGHEST_M - LOWEST_M)
     frames = draw_strip(strip, trace, count=BODIES, seconds_per_metre=seconds_per_metre)
-    draw_intensity(curve, trace)
+    draw_intensity(curve, trace, inches_per_second=wide / seconds)
     draw_moments(curve, trace, frames)
     draw_ribbons(ribbons, trace, inches_per_second=wide / seconds)
     curve.tick_params(axis="x", labelbottom=False, length=0)

@@ -33,7 +33,7 @@ STYLE = f"""
 body {{ font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 62rem;
   margin: 2rem auto; padding: 0 1.2rem; }}
 h1 {{ font-size: 1.5rem; margin-bottom: .2rem; }} h2 {{ font-size: 1.15rem; margin: 2.6rem 0 .2rem; }}
-h2, td, th {{ overflow-wrap: anywhere; }}
+h2 {{ overflow-wrap: anywhere; }}
 p {{ margin: .3rem 0; }} .quiet {{ color: var(--quiet); }}
 .caution {{ color: var(--caution); border-left: 4px solid; padding-left: .7rem; font-weight: 600; }}
 figure {{ margin: .8rem 0; overflow-x: auto; }}
@@ -59,7 +59,7 @@ def section(trace: Trace, number: int) -> str:
         trace: with at least one estimate.
         number: of the section on its page, from 1.
     """
-    runs = [_run_row(trace, span) for span in spans(trace.curve, lambda one: f"{level_of(one)} {emotion_of(one)}")]
+    runs = [_run_row(trace, span) for span in spans(trace.curve, _level_and_emotion)]
     step = _step(trace.end_s - trace.start_s)
     return "\n".join(
         (
@@ -68,7 +68,7 @@ def section(trace: Trace, number: int) -> str:
             f'<p class="quiet">{escape(figure.facts(trace))}</p>',
             f'<figure tabindex="0">{_picture(trace, number)}</figure>',
             _table(("from, s", "to, s", "emotion", "level", "mean", "peak"), runs, words=(2, 3)),
-            f"<details><summary>Numbers, one row for {step:g} s</summary>",
+            f"<details><summary>Numbers, a row every {step:g} s</summary>",
             _table(("time, s", "intensity", "level", "emotion", "status"), _rows(trace, step), words=(2, 3, 4)),
             "</details></section>",
         )
@@ -121,12 +121,16 @@ def _picture(trace: Trace, number: int) -> str:
     return f'{start} {named}>{title}<desc id="words-{number}">{escape(in_words(trace))}</desc>{rest}'
 
 
+def _level_and_emotion(one: Estimate) -> str:
+    return f"{level_of(one)} {emotion_of(one)}"
+
+
 def _run_row(trace: Trace, span: Span) -> tuple[str, ...]:
     level, _, emotion = span.text.partition(" ")
-    inside = [one.intensity for one in trace.curve if span.start <= one.t <= span.end and emotion_of(one) == emotion]
-    seen = [value for value in inside if value is not None]
-    mean, peak = (f"{sum(seen) / len(seen):.2f}", f"{max(seen):.2f}") if seen else ("-", "-")
-    return f"{span.start:.2f}", f"{span.end:.2f}", emotion, level or "-", mean, peak
+    inside = [one for one in trace.curve if span.start <= one.t <= span.end and _level_and_emotion(one) == span.text]
+    run = summarise(trace.name, inside)
+    numbers = ("-" if value is None else f"{value:.2f}" for value in (run.mean, run.peak))
+    return f"{span.start:.2f}", f"{span.end:.2f}", emotion, level or "-", *numbers
 
 
 def _step(seconds: float) -> float:
