@@ -44,12 +44,20 @@ soak: $(VENV)/dev.stamp ## a service under churn for SECONDS=600: fails if it gr
 	@$(BIN)/python -m bench.soak --seconds $(SECONDS)
 
 clean: ## forget the environment and everything made
-	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-face build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "fervor needs Python 3.11 or newer; none was found (PYTHON=... names one)" >&2; exit 69; }
 	@$(PYTHON) -m venv $(VENV) || { echo "$(PYTHON) can't make a virtual environment; on Debian and Ubuntu: apt install python3-venv" >&2; exit 69; }
+
+# An environment of its own: what finds faces wants old versions of what others use.
+.venv-face/stamp: examples/face_labels/requirements.txt pyproject.toml | $(BIN)/python
+	@echo "installing examples/face_labels into .venv-face ..."
+	@$(BIN)/python -m venv .venv-face
+	@.venv-face/bin/python -m pip --disable-pip-version-check install --quiet --no-deps \
+	  --requirement examples/face_labels/requirements.txt --editable .
+	@touch $@
 
 $(VENV)/%.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "installing fervor[$*] into $(VENV) ..."
