@@ -115,6 +115,8 @@ def run_command(command: list[str], live: Live, where: str) -> None:
         case "make":
             makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
             assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
+        case ".venv-face/bin/python":  # an environment of its own: tests/test_example_face_labels.py runs it
+            assert (ROOT / arguments[0]).exists(), where
         case ".":
             assert arguments == [".venv/bin/activate"], where
         case _:
@@ -226,7 +228,7 @@ def test_all_pages_are_in_the_index() -> None:
 
 def test_pages_that_the_code_speaks_of_exist() -> None:
     titles = {head for page in PAGES for head in headings(page)}
-    for source in (path for top in ("service", "export", "clients") for path in (ROOT / top).rglob("*.py")):
+    for source in (path for top in ("service", "export", "clients", "examples") for path in (ROOT / top).rglob("*.py")):
         text = source.read_text(encoding="utf-8")
         for title in re.findall(r'docs, "([^"]+)"', text):
             assert title in titles, f"{source} speaks of the page {title!r}"
