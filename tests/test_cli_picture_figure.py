@@ -9,7 +9,7 @@ import pytest
 from matplotlib.image import imread
 
 from fervor.cli.picture import figure
-from fervor.cli.picture.chart import MOST_POINTS, thinned
+from fervor.cli.picture.chart import MOST_POINTS, _points, thinned
 from fervor.cli.picture.palette import LIGHT, between
 from fervor.cli.picture.strip import _turned_by
 from fervor.skeletons.rig import JOINTS
@@ -109,6 +109,14 @@ def test_many_points_are_thinned_to_their_extremes():
     assert len(kept) <= MOST_POINTS
     assert {0, 31_415, 27_182, 49_999} <= set(kept)
     assert kept == sorted(kept)
+
+
+def test_a_thinned_curve_still_ends_at_its_gaps():
+    hole = [estimate(n, t=n / 120.0, intensity=0.5) for n in range(9000) if not 4001 <= n < 4501]
+    drawn = _points(hole)
+    at = drawn.index(None)
+    assert (drawn[0], drawn[at - 1], drawn[at + 1], drawn[-1]) == (hole[0], hole[4000], hole[4001], hole[-1])
+    assert len(drawn) <= MOST_POINTS + 5
 
 
 def test_few_points_are_all_kept():

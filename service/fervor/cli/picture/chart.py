@@ -1,6 +1,5 @@
 """The chart of a recording: intensity over time with the threshold, and ribbons of level, emotion and status."""
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Any
 
@@ -40,8 +39,8 @@ def draw_intensity(axes: Axes, trace: Trace, *, inches_per_second: float) -> Non
         mine[1:] |= mine[:-1]  # a colour reaches up to where the next begins
         axes.fill_between(times, 0.0, values, where=list(mine), color=colour, alpha=0.28, linewidth=0)
     axes.plot(times, values, color=LIGHT.ink, linewidth=1.3, solid_joinstyle="round")
-    lone = [stretch[0] for stretch in stretches(curve) if len(stretch) == 1 and stretch[0].intensity is not None]
-    axes.plot([one.t for one in lone], [one.intensity for one in lone], ".", color=LIGHT.ink, markersize=4)
+    lone = [(one[0].t, one[0].intensity) for one in stretches(curve) if len(one) == 1]  # a line of one can't be seen
+    axes.plot(*np.asarray(lone, float).reshape(-1, 2).T, ".", color=LIGHT.ink, markersize=4)
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks([0.0, 0.5, 1.0])
     axes.set_ylabel("intensity")
@@ -131,15 +130,15 @@ def _draw_gaps(axes: Axes, found: Sequence[Span], inches_per_second: float) -> N
 
 def _points(curve: Sequence[Estimate]) -> list[Estimate | None]:
     """The estimates to draw, with None where the line breaks."""
-    kept: list[Estimate | None] = []
-    drawn = [curve[at] for at in thinned([one.intensity for one in curve], MOST_POINTS)]
-    breaks = [gap.end for gap in gaps(curve)]
-    for one in drawn:
-        if breaks and one.t >= breaks[0]:
-            kept.append(None)
-            breaks = breaks[bisect_right(breaks, one.t) :]
-        kept.append(one)
-    return kept
+    drawn: list[Estimate | None] = []
+    kept = set(thinned([one.intensity for one in curve], MOST_POINTS))
+    place = 0
+    for stretch in stretches(curve):
+        ends = (place, place + len(stretch) - 1)
+        drawn += [one for at, one in enumerate(stretch, start=place) if at in kept or at in ends]
+        drawn.append(None)
+        place += len(stretch)
+    return drawn[:-1]
 
 
 def thinned(values: Sequence[float | None], most: int) -> list[int]:
