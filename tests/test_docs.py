@@ -108,15 +108,13 @@ def run_command(command: list[str], live: Live, where: str) -> None:
             assert all(f"profiles: [{name}]" in compose for name in profiles), where
         case variable if "=" in variable:
             run_command(arguments, live, where)
-        case "kubectl" | "k6" | "openssl":  # what they act on must be there
-            for named in (word for word in arguments if word.startswith("deploy/")):
+        case "kubectl" | "k6" | "openssl" | ".venv-face/bin/python":  # what they act on must be there
+            for named in (word for word in arguments if word.startswith(("deploy/", "examples/"))):
                 assert (ROOT / named).parent.exists(), where
                 assert (ROOT / named).exists() or program == "openssl", where
         case "make":
             makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
             assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
-        case ".venv-face/bin/python":  # an environment of its own: tests/test_example_face_labels.py runs it
-            assert (ROOT / arguments[0]).exists(), where
         case ".":
             assert arguments == [".venv/bin/activate"], where
         case _:
