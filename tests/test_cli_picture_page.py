@@ -105,6 +105,12 @@ def test_runs_and_numbers_are_those_of_the_estimates():
     assert {row[1] for row in numbers} == {"0.200", "0.800"}
 
 
+def test_a_label_that_flickers_has_few_rows_too():
+    wild = [estimate(n, emotion="joy" if n % 2 else "pride") for n in range(2 * page.MOST_ROWS + 7)]
+    text = page.section(trace(wild), 1)
+    assert f"<p>{page.MOST_ROWS + 7} more are not listed.</p>" in text
+
+
 def test_a_long_recording_has_few_rows():
     hours = [estimate(n, t=n * 0.2) for n in range(40_000)]
     text = page.section(trace(hours), 1)

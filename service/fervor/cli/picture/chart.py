@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from fervor.cli.meter import threshold
 from fervor.cli.picture.palette import LIGHT, between
-from fervor.cli.picture.trace import Span, Trace, emotion_of, gaps, level_of, spans, status_of, stretches
+from fervor.cli.picture.trace import Span, Trace, emotion_of, gaps, level_of, nearest, spans, status_of, stretches
 from fervor.protocol.messages import Estimate
 
 MOST_POINTS = 1500
@@ -48,10 +48,8 @@ def draw_intensity(axes: Axes, trace: Trace, *, inches_per_second: float) -> Non
 
 def draw_moments(axes: Axes, trace: Trace, frames: Sequence[int]) -> None:
     """Where on the curve the drawn poses are."""
-    curve = trace.curve
-    times = np.asarray([estimate.t for estimate in curve])
     for frame in frames:
-        estimate = curve[int(np.abs(times - trace.times[frame]).argmin())]
+        estimate = nearest(trace, float(trace.times[frame]))
         if estimate.intensity is not None:
             axes.axvline(estimate.t, color=LIGHT.rule, linewidth=0.7, zorder=0.5)
             axes.plot(

@@ -11,7 +11,7 @@ from fervor import __version__
 from fervor.cli.meter import describe, is_demo, threshold
 from fervor.cli.picture import figure
 from fervor.cli.picture.palette import DARK, LIGHT, THEMED
-from fervor.cli.picture.trace import Span, Trace, emotion_of, gaps, level_of, spans, status_of
+from fervor.cli.picture.trace import Span, Trace, emotion_of, gaps, level_of, runs, spans, status_of
 from fervor.emotions import UNKNOWN
 from fervor.protocol.messages import Estimate, ModelInfo
 from fervor.scoring import summarise
@@ -59,7 +59,8 @@ def section(trace: Trace, number: int) -> str:
         trace: with at least one estimate.
         number: of the section on its page, from 1.
     """
-    runs = [_run_row(trace, span) for span in spans(trace.curve, _level_and_emotion)]
+    rows = [_run_row(span, run) for span, run in runs(trace.curve, _level_and_emotion)]
+    more = f"<p>{len(rows) - MOST_ROWS} more are not listed.</p>" if len(rows) > MOST_ROWS else ""
     step = _step(trace.end_s - trace.start_s)
     return "\n".join(
         (
@@ -67,7 +68,8 @@ def section(trace: Trace, number: int) -> str:
             f'<h2 id="name-{number}">{escape(trace.name)}</h2>',
             f'<p class="quiet">{escape(figure.facts(trace))}</p>',
             f'<figure tabindex="0">{_picture(trace, number)}</figure>',
-            _table(("from, s", "to, s", "emotion", "level", "mean", "peak"), runs, words=(2, 3)),
+            _table(("from, s", "to, s", "emotion", "level", "mean", "peak"), rows[:MOST_ROWS], words=(2, 3)),
+            more,
             f"<details><summary>Numbers, a row every {step:g} s</summary>",
             _table(("time, s", "intensity", "level", "emotion", "status"), _rows(trace, step), words=(2, 3, 4)),
             "</details></section>",
@@ -125,11 +127,10 @@ def _level_and_emotion(one: Estimate) -> str:
     return f"{level_of(one)} {emotion_of(one)}"
 
 
-def _run_row(trace: Trace, span: Span) -> tuple[str, ...]:
+def _run_row(span: Span, run: Sequence[Estimate]) -> tuple[str, ...]:
     level, _, emotion = span.text.partition(" ")
-    inside = [one for one in trace.curve if span.start <= one.t <= span.end and _level_and_emotion(one) == span.text]
-    run = summarise(trace.name, inside)
-    numbers = ("-" if value is None else f"{value:.2f}" for value in (run.mean, run.peak))
+    summary = summarise("", run)
+    numbers = ("-" if value is None else f"{value:.2f}" for value in (summary.mean, summary.peak))
     return f"{span.start:.2f}", f"{span.end:.2f}", emotion, level or "-", *numbers
 
 

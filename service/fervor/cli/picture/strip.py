@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse
 
 from fervor.cli.picture.palette import LIGHT, between
-from fervor.cli.picture.trace import Trace, intensity_at, last_seen, moments
+from fervor.cli.picture.trace import Trace, last_seen, moments, nearest
 from fervor.skeletons.rig import CHILD_SEGMENT, SEGMENTS
 from fervor.skeletons.standard_body import BONES, LIMBS, points
 
@@ -43,7 +43,7 @@ def draw_strip(axes: Axes, trace: Trace, *, count: int, seconds_per_metre: float
     unseen = np.asarray(np.isnan(trace.poses[frames]).any(-1))  # [moment, joint]
     for number, frame in enumerate(frames):
         time = float(trace.times[frame])
-        intensity = intensity_at(trace, time)
+        intensity = nearest(trace, time).intensity
         colour = LIGHT.quiet if intensity is None else between(LIGHT.weak, LIGHT.strong, intensity)
         at = {name: place[number, :2] * (seconds_per_metre, 1.0) + (time, 0.0) for name, place in places.items()}
         _draw_body(axes, at, unseen[number], colour, seconds_per_metre)

@@ -1,8 +1,10 @@
 """What a picture of a recording shows: estimates over time, runs of what stays the same, gaps. No drawing."""
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
+from itertools import groupby, pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +26,7 @@ class Span:
     text: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Trace:
     """One recording as far as it was estimated, of one body."""
 
@@ -36,7 +38,7 @@ class Trace:
     hysteresis: float | None = None
     """Half-width of the band in which a level stays; None where the model is elsewhere and did not say."""
 
-    @property
+    @cached_property
     def curve(self) -> list[Estimate]:
         """The estimates whose times rise."""
         kept: list[Estimate] = []
@@ -72,20 +74,18 @@ def gaps(estimates: Sequence[Estimate]) -> list[Span]:
     return [Span(one[-1].t, next_[0].t, f"gap {next_[0].t - one[-1].t:.1f} s") for one, next_ in between]
 
 
-def spans(estimates: Sequence[Estimate], of: Callable[[Estimate], str]) -> list[Span]:
-    """Runs of estimates of which the same is said; each ends where the next begins, or at a gap.
-
-    What is said in no words is left out.
-    """
-    found: list[Span] = []
+def runs(estimates: Sequence[Estimate], of: Callable[[Estimate], str]) -> Iterator[tuple[Span, list[Estimate]]]:
+    """Runs of estimates of which the same is said; each ends where the next begins, or at a gap."""
     for stretch in stretches(estimates):
-        begin = stretch[0]
-        for one, next_ in pairwise([*stretch, None]):
-            if next_ is None or of(next_) != of(begin):
-                assert one is not None
-                found.append(Span(begin.t, (next_ or one).t, of(begin)))
-                begin = next_ or one
-    return [span for span in found if span.text]
+        found = [(text, list(run)) for text, run in groupby(stretch, of)]
+        ends = [run[0].t for _, run in found[1:]] + [stretch[-1].t]
+        for (text, run), end in zip(found, ends, strict=True):
+            yield Span(run[0].t, end, text), run
+
+
+def spans(estimates: Sequence[Estimate], of: Callable[[Estimate], str]) -> list[Span]:
+    """When the same is said of estimates; what is said in no words is left out."""
+    return [span for span, _ in runs(estimates, of) if span.text]
 
 
 def level_of(estimate: Estimate) -> str:
@@ -111,9 +111,9 @@ def moments(trace: Trace, count: int) -> list[int]:
     for middle in trace.start_s + width * (np.arange(count) + 0.5):
         if not len(trace.times):
             break
-        nearest = int(np.abs(trace.times - middle).argmin())
-        if abs(trace.times[nearest] - middle) <= width / 2 and nearest not in chosen:
-            chosen.append(nearest)
+        frame = int(np.abs(trace.times - middle).argmin())
+        if abs(trace.times[frame] - middle) <= width / 2 and frame not in chosen:
+            chosen.append(frame)
     return chosen
 
 
@@ -130,8 +130,8 @@ def last_seen(poses: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return held
 
 
-def intensity_at(trace: Trace, time: float) -> float | None:
-    """The intensity of the estimate nearest to a time."""
+def nearest(trace: Trace, time: float) -> Estimate:
+    """The estimate of the curve that is nearest to a time."""
     curve = trace.curve
-    times = np.asarray([estimate.t for estimate in curve])
-    return curve[int(np.abs(times - time).argmin())].intensity
+    after = bisect_left(curve, time, key=lambda one: one.t)
+    return min(curve[max(after - 1, 0) : after + 1], key=lambda one: abs(one.t - time))
