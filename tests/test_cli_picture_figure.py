@@ -102,6 +102,17 @@ def test_a_limb_is_unseen_where_the_joint_above_it_is(point: str, joint: str):
     assert _turned_by(point) == (JOINTS.index(joint),)
 
 
+@pytest.mark.parametrize(("seconds", "first"), [(36, ["0", "5"]), (612, ["0:00", "1:00"]), (8000, ["0:00", "30:00"])])
+def test_time_is_counted_as_people_count(seconds: int, first: list[str]):
+    drawn = figure.draw(trace([estimate(0), estimate(1, t=float(seconds))]))
+    drawn.canvas.draw()
+    low, high = drawn.axes[-1].get_xlim()
+    ticks = zip(drawn.axes[-1].get_xticks(), drawn.axes[-1].get_xticklabels(), strict=True)
+    labels = [label.get_text() for at, label in ticks if low <= at <= high]
+    assert labels[:2] == first
+    assert len(labels) <= 13
+
+
 def test_many_points_are_thinned_to_their_extremes():
     values = [None if n % 97 == 0 else float(np.sin(n)) for n in range(50_000)]
     values[31_415], values[27_182] = 2.0, -2.0

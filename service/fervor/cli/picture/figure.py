@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
 from fervor.cli.meter import describe, is_demo
 from fervor.cli.picture.chart import draw_intensity, draw_moments, draw_ribbons
@@ -39,6 +39,9 @@ SPACE = 0.07
 
 BODIES = 12
 """Poses of a strip."""
+
+MINUTES_FROM_S = 300.0
+"""Duration from which on time is counted in minutes, seconds."""
 
 DOTS_PER_INCH = 200
 
@@ -79,13 +82,21 @@ def _draw(trace: Trace, height: float, top: float) -> Figure:
     draw_moments(curve, trace, frames)
     draw_ribbons(ribbons, trace, inches_per_second=wide / seconds)
     curve.tick_params(axis="x", labelbottom=False, length=0)
-    ribbons.xaxis.set_major_locator(MaxNLocator(nbins=10, steps=[1, 2, 3, 5, 6, 10]))
-    if seconds >= 300:
-        ribbons.xaxis.set_major_formatter(FuncFormatter(lambda time, _: f"{time // 60:.0f}:{time % 60:02.0f}"))
-        ribbons.set_xlabel("time, minutes:seconds", loc="left")
+    _mark_time(ribbons, seconds)
     if top:
         _write_title(figure, trace, height)
     return figure
+
+
+def _mark_time(axes: Axes, seconds: float) -> None:
+    """Ticks that people count in: seconds, or minutes where a recording has many."""
+    if seconds < MINUTES_FROM_S:
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=10, steps=[1, 2, 3, 5, 6, 10]))
+        return
+    step = next((60.0 * minutes for minutes in (1, 2, 5, 10, 30) if seconds / 60 / minutes <= 12), 3600.0)
+    axes.xaxis.set_major_locator(MultipleLocator(step * max(1, round(seconds / step / 12))))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda time, _: f"{time // 60:.0f}:{time % 60:02.0f}"))
+    axes.set_xlabel("time, minutes:seconds", loc="left")
 
 
 def facts(trace: Trace) -> str:
