@@ -85,6 +85,11 @@ def test_odd_recordings_are_drawn(odd):
     assert figure.image(trace(odd), "png").startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("name", ["$joy_{", "a$b$c.bvh", "喜び.bvh", "x" * 300, "", "a\nb"])
+def test_a_name_is_only_a_name(name: str):
+    assert figure.image(trace(RISING[:9], name=name), "png").startswith(b"\x89PNG")
+
+
 def test_a_body_that_was_never_seen_is_drawn_dotted():
     poses = waving(30)
     poses[:, JOINTS.index("l_elbow")] = np.nan

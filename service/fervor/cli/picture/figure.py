@@ -2,6 +2,7 @@
 
 import io
 import re
+import warnings
 from typing import Any
 
 import matplotlib as mpl
@@ -39,6 +40,9 @@ SPACE = 0.07
 
 BODIES = 12
 """Poses of a strip."""
+
+LONGEST_NAME = 43
+"""Letters of a name that stand in the title; of a longer one its ends do."""
 
 MINUTES_FROM_S = 300.0
 """Duration from which on time is counted in minutes, seconds."""
@@ -110,7 +114,8 @@ def facts(trace: Trace) -> str:
 def _write_title(figure: Figure, trace: Trace, height: float) -> None:
     left, right = LEFT / WIDTH, 1.0 - RIGHT / WIDTH
     first, second = 1.0 - 0.24 / height, 1.0 - 0.44 / height
-    figure.text(left, first, trace.name, fontsize=11, fontweight="bold", va="center")
+    name = trace.name if len(trace.name) <= LONGEST_NAME else f"{trace.name[:20]} … {trace.name[-20:]}"
+    figure.text(left, first, name, fontsize=11, fontweight="bold", va="center", parse_math=False)
     figure.text(right, first, facts(trace), ha="right", va="center", color=LIGHT.quiet)
     colour = LIGHT.caution if is_demo(trace.model) else LIGHT.quiet
     figure.text(left, second, describe(trace.model), va="center", color=colour)
@@ -119,7 +124,8 @@ def _write_title(figure: Figure, trace: Trace, height: float) -> None:
 def _saved(figure: Figure, kind: str, **how: Any) -> bytes:
     metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
     out = io.BytesIO()
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a name in a script that the font lacks shows as boxes
         figure.savefig(out, format=kind, dpi=DOTS_PER_INCH, metadata=metadata, **how)
     return _rounded(out.getvalue()) if kind == "svg" else out.getvalue()
 
