@@ -43,8 +43,10 @@ class FaceAnalyser:
             return None
         box = max(found, key=lambda face: face.score[0]).location_data.relative_bounding_box
         square = _cut(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), box)
-        if square is None:
-            return None
+        return None if square is None else self.classify(square)
+
+    def classify(self, square: npt.NDArray[np.uint8]) -> dict[str, float]:
+        """A probability per emotion for a picture [side, side] in grey that a face fills."""
         self._network.set_tensor(self._input, _prepare(square))
         self._network.invoke()
         return dict(zip(EMOTIONS, self._network.get_tensor(self._output)[0].tolist(), strict=True))
