@@ -23,9 +23,9 @@ test: $(VENV)/dev.stamp ## run the tests
 lint: $(VENV)/dev.stamp ## style, format, and the floors of the architecture
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/lint-imports
+	@PYTHONPATH=clients/ros2/fervor_ros $(BIN)/lint-imports  # the ROS package is built by colcon, not installed here
 
-types: $(VENV)/dev.stamp ## mypy --strict on the four packages
+types: $(VENV)/dev.stamp ## mypy --strict on all packages
 	@$(BIN)/mypy
 
 # A package that can't be asked about fails an audit by hand; in CI it is listed, for not every network lets one ask.
@@ -44,7 +44,7 @@ soak: $(VENV)/dev.stamp ## a service under churn for SECONDS=600: fails if it gr
 	@$(BIN)/python -m bench.soak --seconds $(SECONDS)
 
 clean: ## forget the environment and everything made
-	rm -rf $(VENV) .venv-face build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-face .venv-ros build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
