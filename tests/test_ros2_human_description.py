@@ -112,7 +112,7 @@ def rig_of(angles: dict[str, float]) -> np.ndarray:
 
 
 def test_the_table_is_the_urdf() -> None:
-    assert AXES == {joint: axis for joint, (_, _, axis) in URDF.items()}
+    assert {joint: axis for joint, (_, _, axis) in URDF.items()} == AXES
     assert sorted(joint for chain in CHAINS.values() for joint in chain) == sorted(URDF)
 
 
