@@ -116,10 +116,12 @@ def test_a_body_that_ends_begins_anew(live: Live) -> None:
         for frame in frames(60):
             line.send(frame)
         line.end_body("b1")
+        line.end_body("never seen")
         again = frames(60, first=61)
         for frame in again:
             line.send(frame)
         assert wait(120)[60:] == plain(live, again)
+        assert line.line.refused == 0
 
 
 def test_a_session_that_is_lost_for_good_is_followed_by_another(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:

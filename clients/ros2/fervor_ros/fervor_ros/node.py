@@ -19,6 +19,7 @@ from builtin_interfaces.msg import Time as TimeMessage
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from fervor_msgs.msg import Intensity
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -41,7 +42,7 @@ from fervor_ros.transforms import Transform
 from fervor_ros.uplink import Uplink
 
 SWEEP_S = 0.2
-"""How often it is looked who is gone; of the node's clock."""
+"""How often it is looked who is gone."""
 
 
 class FervorNode(Node):
@@ -66,8 +67,9 @@ class FervorNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS.name, 10)
         self._uplink = Uplink(partial(_open_session, self._settings), self._deliver)
         self._listen_to_all()
-        self.create_timer(SWEEP_S, self._sweep)
-        self.create_timer(self._settings.diagnostics_period_s, self._publish_diagnostics)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still, or never begin
+        self.create_timer(SWEEP_S, self._sweep, clock=steady)
+        self.create_timer(self._settings.diagnostics_period_s, self._publish_diagnostics, clock=steady)
         self._uplink.start()
 
     def destroy_node(self) -> None:
@@ -131,9 +133,10 @@ class FervorNode(Node):
                 continue
             try:
                 self._open(topic, human)
-            except InvalidTopicNameException as error:
+            except InvalidTopicNameException:
                 self._unnamable.add(human)
-                self.get_logger().warning(f"the id {human!r} makes no name of a topic, so it is passed over: {error}")
+                expected = "expected letters, digits and _, a letter first"
+                self.get_logger().warning(f"the id {human!r} makes no name of a topic and is passed over; {expected}")
 
     def _open(self, topic: Topic, human: str) -> None:
         name = topic.of(self._settings.humans, human)
@@ -236,10 +239,11 @@ class FervorNode(Node):
 
 def main() -> None:
     """Run the node until it is told to stop."""
-    logging.basicConfig(format="%(name)s: %(message)s", level=logging.WARNING, stream=sys.stderr)
     rclpy.init()
     try:
         node = FervorNode()
+        for name in ("fervor_ros", "fervor_client"):
+            logging.getLogger(name).addHandler(_ToRos(node))
         try:
             rclpy.spin(node)
         finally:
@@ -251,6 +255,17 @@ def main() -> None:
         sys.exit(error.exit_code)
     finally:
         rclpy.try_shutdown()
+
+
+class _ToRos(logging.Handler):
+    """Tells the log of ROS what the line to the service has to tell, from whatever thread."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(logging.WARNING)
+        self._node = node
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._node.get_logger().warning(record.getMessage())
 
 
 def _open_session(

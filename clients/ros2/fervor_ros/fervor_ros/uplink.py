@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from fervor.errors import FervorError, FrameError
 from fervor.protocol.messages import Estimate, ModelInfo
 from fervor_client import Reconnect
+from fervor_client.base import log_reconnect
 from fervor_client.sync import Session
 from fervor_ros.perception import Frame
 
@@ -67,6 +68,8 @@ class Uplink:
         self._line = Line()
         self._session: Session | None = None
         self._closing = False
+        self._here: set[str] = set()
+        """Bodies of which frames went out in this session; the worker's own."""
         self._worker = threading.Thread(target=self._run, name="fervor-uplink", daemon=True)
 
     @property
@@ -121,6 +124,7 @@ class Uplink:
 
     def _carry(self, session: Session) -> None:
         """Send until the session is lost or all ends."""
+        self._here.clear()
         with self._news:
             self._session = session
             self._line = replace(
@@ -144,8 +148,11 @@ class Uplink:
 
     def _pass_on(self, session: Session, item: Frame | _Gone) -> None:
         if isinstance(item, _Gone):
-            session.end_body(item.body)
+            if item.body in self._here:  # the service knows no others
+                self._here.remove(item.body)
+                session.end_body(item.body)
             return
+        self._here.add(item.body)
         session.send(item.rotations, body=item.body, seq=item.seq, t=item.t, emotion=item.emotion)
         with self._news:
             self._count(sent=1)
@@ -180,6 +187,8 @@ class Uplink:
             self._count(refused=1)
 
     def _reconnecting(self, news: Reconnect) -> None:
+        if news.attempt == 1 or news.delay_s is None:  # a long outage is told once
+            log_reconnect(news)
         with self._news:
             if news.delay_s is not None:
                 self._line = replace(self._line, connected=False, trouble=str(news.reason))
