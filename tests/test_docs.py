@@ -30,6 +30,7 @@ from fervor.protocol.messages import ClientMessage, ServerMessage
 from fervor_pepper.program import app as pepper
 from live import Live
 from pages import DOCS, PAGES, ROOT, Block, blocks, headings, read
+from ros_commands import check_ros
 
 SERVICE = "127.0.0.1:8080"
 SAMPLE = ROOT / "service" / "fervor" / "samples" / "joy.bvh"
@@ -116,9 +117,9 @@ def run_command(command: list[str], live: Live, where: str) -> None:
             makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
             assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
         case ".":
-            assert arguments == [".venv/bin/activate"], where
+            assert arguments in ([".venv/bin/activate"], ["install/setup.sh"]), where
         case _:
-            pytest.fail(f"{where}: not a command that this test knows")
+            check_ros(command, where)
 
 
 def commands(block: Block) -> Iterator[str]:
