@@ -39,8 +39,17 @@ def test_of_face_and_person_the_newest_counts() -> None:
     known.person_shows("anna", Label("sadness", 11 * S))
     assert known.emotion_of("b1", 2, 11 * S) == "sadness"
     known.face_shows("f1", Label("surprise", 12 * S))
-    known.face_shows("f1", Label("anger", 9 * S))  # overtaken on its way
+    known.face_shows("f1", Label("anger", 11 * S))  # overtaken on its way
     assert known.emotion_of("b1", 2, 12 * S) == "surprise"
+
+
+def test_a_bag_that_begins_anew_takes_no_labels_of_its_end_along() -> None:
+    known = met(people())
+    known.face_shows("f1", Label("joy", 60 * S))
+    assert known.emotion_of("b1", 2, 60 * S) == "joy"
+    assert known.emotion_of("b1", 2, 10 * S) == UNKNOWN
+    known.face_shows("f1", Label("fear", 11 * S))
+    assert known.emotion_of("b1", 2, 11 * S) == "fear"
 
 
 def test_a_label_ends_by_its_stamp() -> None:

@@ -2,13 +2,14 @@
 
 Rules. A body's person is the one whose `body_id` it is. The person's label is the newest of its own expression and of
 its face's. Where no person is known and there is one face and one body only, they belong together (`pair_alone`). A
-label holds for `ttl` from its own stamp on; after that, and where none came, the label is the one of the settings.
+label holds for `ttl` from its own stamp on; after that, and where none came, the label is the one of the settings. An
+expression that was overtaken on its way is passed over.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from fervor_ros.pose import Stamp
+from fervor_ros.pose import STEP_BACK_NS, Stamp
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +64,14 @@ class People:
 
     def face_shows(self, face: str, label: Label) -> None:
         """A face has an expression."""
-        newest = _newest(self._labels.get(face), label)
-        if newest is not None and face in self.known_faces:
-            self._labels[face] = newest
+        if face in self.known_faces:
+            self._labels[face] = _follow(self._labels.get(face), label)
 
     def person_shows(self, person: str, label: Label) -> None:
         """A person has an expression, whatever it was told from."""
         known = self._persons.get(person)
         if known is not None:
-            known.label = _newest(known.label, label)
+            known.label = _follow(known.label, label)
 
     @property
     def known_persons(self) -> frozenset[str]:
@@ -96,7 +96,7 @@ class People:
             now: stamp of its pose.
         """
         label = self._label(body, bodies)
-        if label is None or (self.ttl_ns is not None and now - label.stamp > self.ttl_ns):
+        if label is None or (self.ttl_ns is not None and abs(now - label.stamp) > self.ttl_ns):
             return self.fallback
         return label.emotion
 
@@ -114,8 +114,14 @@ class People:
         self._labels = {face: label for face, label in self._labels.items() if face in known}
 
 
+def _follow(known: Label | None, label: Label) -> Label:
+    """The label that counts when another one comes."""
+    late = known is not None and 0 < known.stamp - label.stamp <= STEP_BACK_NS
+    return known if known is not None and late else label
+
+
 def _newest(known: Label | None, label: Label | None) -> Label | None:
-    """The newer of two; of equals the latter."""
+    """The newer of two."""
     if known is None or label is None:
         return known or label
     return label if label.stamp >= known.stamp else known

@@ -9,6 +9,9 @@ import numpy.typing as npt
 Stamp = int
 """Nanoseconds of the ROS clock that headers bear."""
 
+STEP_BACK_NS = 1_000_000_000
+"""What is older than the newest by no more than this is late; by more, the clock was set back: a bag begins anew."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:

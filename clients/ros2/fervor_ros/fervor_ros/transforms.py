@@ -16,13 +16,10 @@ import numpy.typing as npt
 
 from fervor.rotations import conjugate, multiply
 from fervor.skeletons.skeleton import Skeleton
-from fervor_ros.pose import Pose, Stamp
+from fervor_ros.pose import STEP_BACK_NS, Pose, Stamp
 
 Rotation = npt.NDArray[np.float64]
 """[4] xyzw."""
-
-STEP_BACK_NS = 1_000_000_000
-"""What is older than the newest by no more than this is late and passed over; by more, the clock was set back."""
 
 DEEPEST = 64
 """Frames between a link and the root; more are a loop."""
