@@ -66,6 +66,16 @@ def test_transforms_find_their_body_even_if_ids_end_alike() -> None:
     assert found == ["b_1", "b_1", "1", "1"]  # the first pose of each is whole when the second begins
 
 
+def test_static_frames_count_even_if_their_body_is_listed_later() -> None:
+    known = perception(source="tf")
+    turn, still = np.array([0.0, 0.6, 0.0, 0.8]), np.array([0.0, 0.0, 0.0, 1.0])
+    known.transform(Transform("torso_b1", "waist_b1", still, 0), static=True)
+    known.bodies_listed(["b1"], NOW)
+    known.transform(Transform("waist_b1", "body_b1", turn, NOW))
+    (frame,) = known.transform(Transform("waist_b1", "body_b1", turn, NOW + S // 30))[:1]
+    assert frame.rotations[ROS4HRI.joints.index("torso")].tolist() == turn.tolist()
+
+
 def test_every_frame_bears_the_label_in_force() -> None:
     known = perception(emotion_ttl_s=1.0)
     known.bodies_listed(["b1"], NOW)

@@ -68,7 +68,7 @@ def test_the_launch_file_starts_what_the_package_installs() -> None:
     tree = ast.parse((PACKAGE / "launch" / "fervor.launch.py").read_text(encoding="utf-8"))
     words = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     assert {"fervor_ros", "fervor_node", "fervor", "fervor.yaml"} <= words
-    assert '"fervor_node = fervor_ros.node:main"' in (PACKAGE / "setup.py").read_text(encoding="utf-8")
+    assert '"fervor_node = fervor_ros.main:main"' in (PACKAGE / "setup.py").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("package", ["fervor_ros", "fervor_msgs"])

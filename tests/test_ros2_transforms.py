@@ -33,17 +33,18 @@ def urdf_frames(angles: dict[str, float], stamp: int, *, body: str = "b1") -> tu
     return moving, fixed
 
 
+FIXED = {transform.frame: transform for transform in urdf_frames(dict.fromkeys(AXES, 0.0), 0)[1]}
+
+
 def played(transforms: Transforms, *messages: list[Transform]) -> list[Pose]:
     return [pose for message in messages for transform in message for pose in transforms.move(transform)]
 
 
 def test_frames_of_the_urdf_are_its_joint_angles() -> None:
-    transforms = Transforms("b1", ROS4HRI)
+    transforms = Transforms("b1", ROS4HRI, FIXED)
     motion = [random_angles() for _ in range(3)]
     stamps = [10 * MS, 20 * MS, 30 * MS]
     messages = [urdf_frames(angles, stamp) for angles, stamp in zip(motion, stamps, strict=True)]
-    for transform in messages[0][1]:
-        transforms.fix(transform)
     poses = played(transforms, *(moving for moving, _ in messages))
     assert [pose.stamp for pose in poses] == stamps
     for pose, angles in zip(poses, motion, strict=True):
@@ -64,7 +65,7 @@ def test_frames_that_all_hang_from_one(root: str) -> None:
         Transform(f"{link}_b1", root if f"{link}_b1" != root else "camera", turn.as_quat(), MS)
         for link, turn in zip(ROS4HRI.joints, turns, strict=True)
     ]
-    transforms = Transforms("b1", ROS4HRI)
+    transforms = Transforms("b1", ROS4HRI, FIXED)
     assert played(transforms, frames) == []  # nobody knows yet that it is whole
     (pose,) = transforms.flush()
     apart = Rotation.from_quat(pose.rotations[1:]) * Rotation.from_quat(local[1:]).inv()
@@ -72,10 +73,8 @@ def test_frames_that_all_hang_from_one(root: str) -> None:
 
 
 def test_a_pose_is_told_as_soon_as_it_is_whole_and_once() -> None:
-    transforms = Transforms("b1", ROS4HRI)
-    first, fixed = urdf_frames(random_angles(), MS)
-    for transform in fixed:
-        transforms.fix(transform)
+    transforms = Transforms("b1", ROS4HRI, FIXED)
+    first, _ = urdf_frames(random_angles(), MS)
     played(transforms, first)
     second, _ = urdf_frames(random_angles(), 2 * MS)
     assert [pose.stamp for pose in played(transforms, second[:-1])] == [MS]
@@ -85,13 +84,11 @@ def test_a_pose_is_told_as_soon_as_it_is_whole_and_once() -> None:
 
 
 def test_a_frame_that_missed_a_stamp_is_untracked_in_its_pose_alone() -> None:
-    transforms = Transforms("b1", ROS4HRI)
+    transforms = Transforms("b1", ROS4HRI, FIXED)
     knee = next(
         index for index, transform in enumerate(urdf_frames(random_angles(), 0)[0]) if "l_knee" in transform.frame
     )
     messages = [urdf_frames(random_angles(), stamp * MS) for stamp in (1, 2, 3, 4)]
-    for transform in messages[0][1]:
-        transforms.fix(transform)
     moving = [moving for moving, _ in messages]
     del moving[1][knee]
     poses = played(transforms, *moving)
@@ -101,13 +98,13 @@ def test_a_frame_that_missed_a_stamp_is_untracked_in_its_pose_alone() -> None:
 
 
 def test_what_comes_late_is_passed_over_and_a_clock_set_back_is_not() -> None:
-    transforms = Transforms("b1", ROS4HRI)
+    transforms = Transforms("b1", ROS4HRI, FIXED)
     messages = [urdf_frames(random_angles(), stamp)[0] for stamp in (5_000 * MS, 5_010 * MS, 4_900 * MS, 100 * MS)]
     assert [pose.stamp for pose in played(transforms, *messages)] == [5_000 * MS, 5_010 * MS, 100 * MS]
 
 
 def test_frames_in_a_ring_are_untracked() -> None:
-    transforms = Transforms("b1", ROS4HRI)
+    transforms = Transforms("b1", ROS4HRI, FIXED)
     still = np.array([0.0, 0, 0, 1])
     ring = [Transform("head_b1", "torso_b1", still, MS), Transform("torso_b1", "head_b1", still, MS)]
     played(transforms, ring)

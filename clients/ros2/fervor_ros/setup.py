@@ -26,5 +26,5 @@ setup(
     maintainer_email="fervor@example.org",
     description="Live emotional intensity of tracked people (REP-155) from a fervor service.",
     license="Apache-2.0",
-    entry_points={"console_scripts": ["fervor_node = fervor_ros.node:main"]},
+    entry_points={"console_scripts": ["fervor_node = fervor_ros.main:main"]},
 )

@@ -4,24 +4,20 @@ All of ROS happens in the executor's thread. Estimates come from another one: th
 condition wakes the executor.
 """
 
-import logging
 import math
 import os
 import queue
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-import rclpy
 from builtin_interfaces.msg import Time as TimeMessage
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from fervor_msgs.msg import Intensity
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.time import Time
@@ -65,7 +61,7 @@ class FervorNode(Node):
         self._estimates: queue.SimpleQueue[Estimate] = queue.SimpleQueue()
         self._awake = self.create_guard_condition(self._publish_estimates)
         self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS.name, 10)
-        self._uplink = Uplink(partial(_open_session, self._settings), self._deliver)
+        self._uplink = Uplink(partial(_open_session, self._settings, os.environ.get("FERVOR_TOKEN")), self._deliver)
         self._listen_to_all()
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # simulated time may stand still, or never begin
         self.create_timer(SWEEP_S, self._sweep, clock=steady)
@@ -237,45 +233,17 @@ class FervorNode(Node):
         return Time.from_msg(stamp).nanoseconds or self._now()
 
 
-def main() -> None:
-    """Run the node until it is told to stop."""
-    rclpy.init()
-    try:
-        node = FervorNode()
-        for name in ("fervor_ros", "fervor_client"):
-            logging.getLogger(name).addHandler(_ToRos(node))
-        try:
-            rclpy.spin(node)
-        finally:
-            node.destroy_node()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except FervorError as error:
-        sys.stderr.write(f"fervor_node: {error.message}\n")
-        sys.exit(error.exit_code)
-    finally:
-        rclpy.try_shutdown()
-
-
-class _ToRos(logging.Handler):
-    """Tells the log of ROS what the line to the service has to tell, from whatever thread."""
-
-    def __init__(self, node: Node) -> None:
-        super().__init__(logging.WARNING)
-        self._node = node
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._node.get_logger().warning(record.getMessage())
-
-
 def _open_session(
-    settings: Settings, on_error: Callable[[FervorError], None], on_reconnect: Callable[[Reconnect], None]
+    settings: Settings,
+    token: str | None,
+    on_error: Callable[[FervorError], None],
+    on_reconnect: Callable[[Reconnect], None],
 ) -> Session:
     options = Options() if settings.axes is None else Options(axes=settings.axes)
     return sync.connect(
         settings.service,
         skeleton=settings.skeleton.name,
-        token=os.environ.get("FERVOR_TOKEN"),
+        token=token,
         on_error=on_error,
         on_reconnect=on_reconnect,
         retry_for=None,

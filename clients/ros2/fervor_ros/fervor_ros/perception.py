@@ -34,6 +34,9 @@ from fervor_ros.transforms import Transform, Transforms
 MOST_UNANSWERED = 8192
 """Stamps kept for estimates that have not come; more frames are never under way."""
 
+MOST_FIXED = 4096
+"""Static frames kept: those of the robot, and a few of every body that ever came."""
+
 NS = 1_000_000_000
 
 
@@ -65,6 +68,7 @@ class Perception:
         self._roster = Roster(settings.bodies, settings.body_grace_ns)
         self._people = People(settings.emotion, settings.emotion_ttl_ns, settings.pair_alone)
         self._transforms: dict[str, Transforms] = {}
+        self._fixed: OrderedDict[str, Transform] = OrderedDict()
         self._moving: set[str] = set()
         self._watched: frozenset[str] = frozenset()
         self._seq = 0
@@ -143,13 +147,18 @@ class Perception:
 
     def transform(self, transform: Transform, *, static: bool = False) -> list[Frame]:
         """A transform of TF, of whatever frame; gives the frames that are whole with it."""
+        if static:  # told once, and maybe before its body is listed
+            self._fixed[transform.frame] = transform
+            self._fixed.move_to_end(transform.frame)
+            if len(self._fixed) > MOST_FIXED:
+                self._fixed.popitem(last=False)
+            return []
         body = self._owner(transform.frame)
         if body is None:
             return []
-        transforms = self._transforms.setdefault(body, Transforms(body, self._settings.skeleton))
-        if static:
-            transforms.fix(transform)
-            return []
+        transforms = self._transforms.get(body)
+        if transforms is None:
+            transforms = self._transforms[body] = Transforms(body, self._settings.skeleton, self._fixed)
         return [self._frame(pose) for pose in transforms.move(transform)]
 
     # --- what comes back ----------------------------------------------------------------------------------------------

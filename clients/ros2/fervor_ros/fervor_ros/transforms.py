@@ -8,7 +8,7 @@ in its pose. Static frames hold for ever.
 tf2's buffer is not used: it interpolates between stamps, and a pose shall enter the recurrence as it was measured.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,10 +38,11 @@ class Transform:
 class Transforms:
     """The frames of one body."""
 
-    def __init__(self, body: str, skeleton: Skeleton) -> None:
+    def __init__(self, body: str, skeleton: Skeleton, fixed: Mapping[str, Transform]) -> None:
+        """`fixed`: static transforms by frame, those of others among them; it may grow."""
         self._body = body
         self._skeleton = skeleton
-        self._static: dict[str, Transform] = {}
+        self._fixed = fixed
         self._moving: dict[str, Transform] = {}
         self._stamp: Stamp | None = None
         """Of the pose that is under way, or was given last."""
@@ -49,10 +50,6 @@ class Transforms:
         self._come: set[str] = set()
         self._expected: set[str] = set()
         """Frames that the last pose had."""
-
-    def fix(self, transform: Transform) -> None:
-        """Take a static transform."""
-        self._static[transform.frame] = transform
 
     def move(self, transform: Transform) -> list[Pose]:
         """Take a transform; give the poses that are whole with it."""
@@ -120,7 +117,7 @@ class Transforms:
         moving = self._moving.get(frame)
         if moving is not None:
             return moving if moving.stamp == stamp else None
-        return self._static.get(frame)
+        return self._fixed.get(frame)
 
 
 def _product(way: Sequence[Transform]) -> Rotation:

@@ -152,8 +152,8 @@ class Uplink:
                 self._here.remove(item.body)
                 session.end_body(item.body)
             return
-        self._here.add(item.body)
         session.send(item.rotations, body=item.body, seq=item.seq, t=item.t, emotion=item.emotion)
+        self._here.add(item.body)
         with self._news:
             self._count(sent=1)
 
