@@ -35,5 +35,5 @@ def _node(context: LaunchContext) -> list[Node]:
         over["service"] = given["service"]
     if given["use_sim_time"]:
         over["use_sim_time"] = given["use_sim_time"].lower() == "true"
-    parameters = [LaunchConfiguration("params_file"), over]
+    parameters = [LaunchConfiguration("params_file"), *([over] if over else [])]
     return [Node(package="fervor_ros", executable="fervor_node", name="fervor", output="screen", parameters=parameters)]
