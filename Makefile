@@ -8,7 +8,7 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check install --quiet --con
 # Slow proofs run in CI; `make test MARKS=` runs them here.
 MARKS  ?= $(if $(CI),,-m "not slow")
 
-.PHONY: help run test lint types audit bench soak clean
+.PHONY: help run test lint types js audit bench soak clean
 .DEFAULT_GOAL := help
 
 help: ## what there is to say
@@ -28,6 +28,17 @@ lint: $(VENV)/dev.stamp ## style, format, and the floors of the architecture
 types: $(VENV)/dev.stamp ## mypy --strict on all packages
 	@$(BIN)/mypy
 
+JS := clients/js
+
+js: $(JS)/dist/index.js ## build the JavaScript client (Node 20 or newer)
+
+$(JS)/node_modules/.stamp: $(JS)/package.json $(JS)/package-lock.json
+	@cd $(JS) && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+	@touch $@
+
+$(JS)/dist/index.js: $(JS)/node_modules/.stamp $(JS)/tsconfig.json $(JS)/tsconfig.build.json $(wildcard $(JS)/src/*.ts)
+	@cd $(JS) && npm run --silent build
+
 # A package that can't be asked about fails an audit by hand; in CI it is listed, for not every network lets one ask.
 STRICT ?= $(if $(CI),,--strict)
 
@@ -44,7 +55,8 @@ soak: $(VENV)/dev.stamp ## a service under churn for SECONDS=600: fails if it gr
 	@$(BIN)/python -m bench.soak --seconds $(SECONDS)
 
 clean: ## forget the environment and everything made
-	rm -rf $(VENV) .venv-face .venv-ros build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-face .venv-ros build dist $(JS)/build $(JS)/dist $(JS)/node_modules .mypy_cache .ruff_cache \
+	  .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -48,6 +48,7 @@ export class Log {
   #calibrate: Entry | undefined;
   #held = ""; // the body whose frames the calibration rests on
   #place = 0;
+  #stale: string[] = []; // bodies that the service resumed, and that are none any more
 
   constructor(options: LogOptions) {
     this.#options = options;
@@ -124,7 +125,7 @@ export class Log {
   checkpoint(message: Checkpoint): void {
     const track = this.#tracks.get(message.body);
     if (track === undefined) return;
-    if (track.token === "" || message.seq !== track.seq) {
+    if (message.seq !== track.seq) {
       const { latest } = this.#options;
       const covered = track.entries.find((entry) => entry.seq === message.seq && (entry.answered || latest));
       if (covered === undefined) return;
@@ -142,7 +143,7 @@ export class Log {
   /** New terms are in force: checkpoints of the old ones are void, and the bodies were reset. */
   calibrated(): void {
     this.calibrationFailed();
-    for (const track of this.#tracks.values()) track.giveUp();
+    for (const track of this.#tracks.values()) if (!track.untouched) track.giveUp();
   }
 
   /** Nothing came of it. */
@@ -173,12 +174,13 @@ export class Log {
     return refused.length > 0;
   }
 
-  /** The service goes on with these bodies only. */
+  /** The service goes on with these bodies only; those that ended, or were given up, since it was asked must end there. */
   resumed(bodies: readonly Resumed[]): void {
     for (const [name, track] of this.#tracks) {
       const known = bodies.some(({ body, seq }) => body === name && seq === track.seq);
       if (track.token !== "" && !known) track.giveUp();
     }
+    this.#stale = bodies.map(({ body }) => body).filter((body) => !this.#tracks.get(body)?.token);
   }
 
   /** What to send again, in order, and which of it are frames that were answered before. */
@@ -190,7 +192,8 @@ export class Log {
     const echoes = again.flatMap(({ entry: { seq, answered }, body }) =>
       answered && seq !== undefined ? [{ body, seq }] : [],
     );
-    return { messages: again.map(({ entry }) => entry.message), echoes };
+    const ends = this.#stale.map((body): BodyEnd => ({ type: "body.end", body }));
+    return { messages: [...ends, ...again.map(({ entry }) => entry.message)], echoes };
   }
 
   /** Drop what a service without this body's checkpoint has no use for. */

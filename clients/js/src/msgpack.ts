@@ -110,14 +110,16 @@ class Packer {
   }
 
   #byte(value: number): void {
-    this.#bytes[this.#room(1)] = value;
+    const at = this.#room(1);
+    this.#bytes[at] = value;
   }
 
   #copy(bytes: Uint8Array): void {
-    this.#bytes.set(bytes, this.#room(bytes.length));
+    const at = this.#room(bytes.length);
+    this.#bytes.set(bytes, at);
   }
 
-  /** Where so many bytes begin that are to be written next. */
+  /** Where so many bytes begin that are to be written next; it may make the buffer another one. */
   #room(count: number): number {
     const at = this.#at;
     this.#at += count;

@@ -33,7 +33,7 @@ export class Track {
   /** Since the checkpoint or, without one, since the body came. */
   entries: Entry[] = [];
   token = "";
-  /** Newest frame that the checkpoint covers. */
+  /** Newest frame that the checkpoint covers; without one, that the entries follow, where there is one. */
   seq = -1;
   /** When the checkpoint came, seconds. */
   since = 0;
@@ -48,6 +48,11 @@ export class Track {
   unlabelled = false;
   #endings = 0;
   #label: Label | undefined;
+
+  /** Nothing of it was answered: all of it is still to come. */
+  get untouched(): boolean {
+    return this.whole && this.token === "" && !this.entries.some((entry) => entry.answered);
+  }
 
   /** The label in force at `time`, before any frame under way. */
   labelAt(time: number, ttlS: number | null | undefined): Emotion | undefined {
@@ -77,7 +82,7 @@ export class Track {
 
   /** This body can't be resumed until its next checkpoint: only what that one may not cover is kept. */
   giveUp(): void {
-    this.#forgetCheckpoint();
+    this.token = "";
     this.whole = false;
     const newest = this.entries.findLast((entry) => entry.answered);
     if (newest !== undefined) this.#dropBefore(newest);
@@ -87,6 +92,7 @@ export class Track {
   beginAnew(): void {
     const first = this.entries.findIndex((entry) => entry.seq !== undefined && (this.whole || !entry.answered));
     this.entries = first < 0 ? [] : this.entries.slice(first);
+    this.seq = -1;
     this.whole = true;
     this.here &&= this.entries.length > 0 && !this.entries.at(-1)?.ends;
     this.unlabelled = this.entries.length === 0 && this.#label !== undefined;
@@ -107,7 +113,8 @@ export class Track {
       const life = this.entries.findIndex((entry) => entry.ends) + 1;
       if (this.entries.slice(0, life).some((entry) => entry.seq !== undefined && !entry.answered)) return;
       this.entries.splice(0, life);
-      this.#forgetCheckpoint();
+      this.token = "";
+      this.seq = -1;
       this.whole = true;
       this.#label = undefined;
     }
@@ -116,11 +123,7 @@ export class Track {
   /** Drop what stands before an answered entry, except frames under way. */
   #dropBefore(entry: Entry): void {
     const kept = this.entries.findIndex((each) => each === entry || (each.seq !== undefined && !each.answered));
+    if (kept !== 0) this.seq = -1;
     this.entries.splice(0, kept < 0 ? this.entries.length : kept);
-  }
-
-  #forgetCheckpoint(): void {
-    this.token = "";
-    this.seq = -1;
   }
 }

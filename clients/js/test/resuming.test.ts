@@ -1,0 +1,190 @@
+// A stream that is cut, wherever that is, goes on as if nothing had happened.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import fc from "fast-check";
+import { CheckpointUnknown, Unreachable } from "../src/errors.ts";
+import type { Estimate } from "../src/messages.ts";
+import { Robot, type RobotOptions } from "./robot.ts";
+
+type Action =
+  | { kind: "frame"; body: string; x: number; after: number; emotion?: string }
+  | { kind: "reset" | "end" | "calibrate"; body: string }
+  | { kind: "send" | "listen" | "hear" | "cut" };
+
+const body = fc.constantFrom("ann", "bob", "cyd");
+
+/** Frames, some of which are refused, late, or come after a body was away for long. */
+const frames = (odd: { x: number[]; after: number[] }) =>
+  fc.record({
+    kind: fc.constant("frame" as const),
+    body,
+    x: fc.oneof({ weight: 30, arbitrary: fc.integer({ min: 0, max: 8 }) }, ...odd.x.map((x) => fc.constant(x))),
+    after: fc.oneof({ weight: 30, arbitrary: fc.constantFrom(0.1, 0.3) }, ...odd.after.map((s) => fc.constant(s))),
+    emotion: fc.option(fc.constantFrom("joy", "fear"), { nil: undefined, freq: 6 }),
+  });
+
+/** Not both: a frame that is refused is taken as one that made the service forget others; see Log. */
+const frame = { refused: frames({ x: [9], after: [-0.05] }), away: frames({ x: [], after: [11, -0.05] }) };
+const move = fc.record({ kind: fc.constantFrom("send" as const, "listen" as const, "hear" as const) });
+const cut = fc.record({ kind: fc.constant("cut" as const) });
+const other = fc.record({ kind: fc.constantFrom("reset" as const, "end" as const, "calibrate" as const), body });
+
+function actions(odd: keyof typeof frame, others = 1): fc.Arbitrary<Action[]> {
+  const kinds = fc.oneof(
+    { weight: 10, arbitrary: frame[odd] },
+    { weight: 20, arbitrary: move },
+    { weight: 1, arbitrary: cut },
+    { weight: others, arbitrary: other },
+  );
+  return fc.array(kinds as fc.Arbitrary<Action>, { maxLength: 150, size: "max" });
+}
+
+class Story {
+  readonly robot: Robot;
+  readonly #cuts: boolean;
+  #asked = false;
+  time = 0;
+  calibrated = 0;
+
+  constructor(options: RobotOptions, cuts: boolean) {
+    this.robot = new Robot({ emotion: "joy", ...options });
+    this.#cuts = cuts;
+  }
+
+  play(told: readonly Action[]): this {
+    for (const action of told) this.#act(action);
+    this.robot.settle();
+    return this;
+  }
+
+  #act(action: Action): void {
+    const { robot } = this;
+    if (action.kind === "frame") {
+      this.time = Math.max(this.time + action.after, 0);
+      const { body, x, emotion } = action;
+      robot.frame(x, { body, t: this.time, ...(emotion === undefined ? {} : { emotion }) });
+    } else if (action.kind === "reset") robot.conversation.resetBody(action.body);
+    else if (action.kind === "end") robot.conversation.endBody(action.body);
+    else if (action.kind === "calibrate") {
+      if (this.#asked) return; // another one would take the place of the first, where that is not answered yet
+      this.#asked = true;
+      robot.conversation.calibrate({ body: action.body }, { resolve: () => this.calibrated++, reject: () => {} });
+    } else if (action.kind !== "cut") robot[action.kind]();
+    else if (this.#cuts && robot.conversation.linked) robot.cut();
+  }
+
+  /** What was told of each frame, in the order of frames; each once. */
+  told(): Map<string, Partial<Estimate>[]> {
+    const bodies = new Map<string, Partial<Estimate>[]>();
+    for (const { body, seq, intensity, emotion, flags } of this.robot.read()) {
+      bodies.set(body, [...(bodies.get(body) ?? []), { seq, intensity, emotion, flags }]);
+    }
+    for (const estimates of bodies.values()) estimates.sort((one, another) => one.seq! - another.seq!);
+    return bodies;
+  }
+}
+
+for (const encoding of ["json", "msgpack"] as const) {
+  for (const odd of ["refused", "away"] as const) {
+    test(`cuts change nothing, in ${encoding}, with frames that are ${odd}`, () => {
+      fc.assert(
+        fc.property(actions(odd), (told) => {
+          const whole = new Story({ encoding }, false).play(told);
+          const torn = new Story({ encoding }, true).play(told);
+          assert.deepEqual(torn.told(), whole.told());
+          assert.equal(torn.calibrated, whole.calibrated);
+          assert.equal(torn.robot.conversation.inFlight, 0);
+          assert.equal(torn.robot.conversation.state, "open");
+        }),
+        { numRuns: 300 },
+      );
+    });
+  }
+}
+
+test("under delivery latest every frame counts as answered, and the newest is told of each body", () => {
+  fc.assert(
+    fc.property(actions("refused", 0), (told) => {
+      const whole = new Story({}, false).play(told).told();
+      const torn = new Story({ delivery: "latest" }, true).play(told);
+      assert.equal(torn.robot.conversation.inFlight, 0);
+      for (const [name, estimates] of torn.told()) {
+        const all = whole.get(name)!;
+        assert.deepEqual(estimates.at(-1), all.at(-1));
+        for (const estimate of estimates)
+          assert.deepEqual(
+            estimate,
+            all.find(({ seq }) => seq === estimate.seq),
+          );
+      }
+    }),
+    { numRuns: 200 },
+  );
+});
+
+test("a service with another key begins bodies anew, with their label, and says so", () => {
+  const robot = new Robot();
+  for (let seq = 0; seq < 20; seq++) robot.frame(seq % 7, { t: seq / 10, ...(seq === 0 ? { emotion: "fear" } : {}) });
+  robot.settle();
+  robot.key = "another one";
+  robot.cut();
+  robot.settle();
+  for (let seq = 20; seq < 25; seq++) robot.frame(1, { t: seq / 10 });
+  robot.settle();
+  const told = robot.read();
+  assert.deepEqual(
+    told.map(({ seq }) => seq),
+    Array.from({ length: 25 }, (_, seq) => seq),
+  );
+  assert.deepEqual(
+    told.filter(({ flags }) => flags.includes("reset")).map(({ seq }) => seq),
+    [20],
+  );
+  assert.deepEqual(new Set(told.map(({ emotion }) => emotion)), new Set(["fear"]));
+  assert.deepEqual(robot.reconnects.at(-1)?.anew, ["0"]);
+  assert.ok(robot.reconnects.some(({ reason }) => reason instanceof CheckpointUnknown));
+});
+
+test("beyond the most that is kept a body is given up, with a warning, and goes on from its next checkpoint", () => {
+  const robot = new Robot({ mostKept: 8 });
+  for (let seq = 0; seq < 20; seq++) {
+    robot.frame(1, { t: seq / 1000 }); // one checkpoint, of the first frame
+    robot.settle();
+  }
+  assert.match(robot.warnings[0] ?? "", /no checkpoint of body '0' in 8 messages/);
+  robot.cut();
+  robot.settle();
+  robot.frame(1, { t: 0.1 });
+  robot.settle();
+  assert.deepEqual(robot.reconnects.at(-1)?.anew, ["0"]);
+  assert.deepEqual(robot.read().at(-1)?.flags, ["reset"]);
+});
+
+test("a conversation that does not resume is lost with the first cut", () => {
+  const robot = new Robot({ resumes: false });
+  robot.frame(1, { t: 0 });
+  robot.cut(new Unreachable("the line is dead"));
+  assert.equal(robot.conversation.state, "closed");
+  assert.throws(() => robot.frame(1, { t: 1 }), /the line is dead/);
+});
+
+test("once nobody has answered for long enough it is over, with a sentence that says all of it", () => {
+  const robot = new Robot({ retryForS: 3 });
+  robot.settle();
+  robot.cut(new Unreachable("the line is dead"));
+  while (robot.conversation.state === "open") robot.cut(new Unreachable("nobody answers"));
+  const { message } = robot.conversation.failure!;
+  assert.match(message, /^the line is dead; tried to reconnect \d+ times in 3 s, the last time: nobody answers$/);
+});
+
+test("a goodbye that only the service has heard ends the session well", () => {
+  const robot = new Robot();
+  robot.frame(1, { t: 0 });
+  robot.settle();
+  robot.conversation.end();
+  robot.cut();
+  assert.equal(robot.conversation.state, "closed");
+  assert.equal(robot.conversation.totals?.estimates, 1);
+  assert.equal(robot.conversation.failure, undefined);
+});
