@@ -29,15 +29,17 @@ types: $(VENV)/dev.stamp ## mypy --strict on all packages
 	@$(BIN)/mypy
 
 JS := clients/js
+# Where .ci/install puts a Node if the machine has none.
+WITH_NODE := PATH="$(CURDIR)/$(BIN):$$PATH"
 
 js: $(JS)/dist/index.js ## build the JavaScript client (Node 20 or newer)
 
 $(JS)/node_modules/.stamp: $(JS)/package.json $(JS)/package-lock.json
-	@cd $(JS) && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+	@cd $(JS) && $(WITH_NODE) npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
 	@touch $@
 
 $(JS)/dist/index.js: $(JS)/node_modules/.stamp $(JS)/tsconfig.json $(JS)/tsconfig.build.json $(wildcard $(JS)/src/*.ts)
-	@cd $(JS) && npm run --silent build
+	@cd $(JS) && $(WITH_NODE) npm run --silent build
 
 # A package that can't be asked about fails an audit by hand; in CI it is listed, for not every network lets one ask.
 STRICT ?= $(if $(CI),,--strict)
