@@ -61,6 +61,17 @@ def desk(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The browser; skips where there is none, except in CI."""
+    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail("no Chromium is here")
+        pytest.skip("no Chromium is here")
+    return found
+
+
 class Script:
     """A script of Node's that runs, and that says what it does in lines of JSON."""
 

@@ -3,7 +3,7 @@
 Rules. Blocks of a page run in order, in a folder with a few recordings, against a real service: its address stands in
 for `SERVICE` in the text, and nothing else is changed. Python blocks share one namespace; what one prints must be what
 a `text` block right below says. Commands that don't end soon are only parsed, by the program itself. Lines of `json`
-blocks are messages of the protocol.
+blocks are messages of the protocol. JavaScript is run by test_js_docs.py.
 """
 
 import io
@@ -116,8 +116,9 @@ def run_command(command: list[str], live: Live, where: str) -> None:
         case "make":
             makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
             assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
-        case ".":
-            assert arguments in ([".venv/bin/activate"], ["install/setup.sh"]), where
+        case "." | "npm":  # the latter is run by test_js_docs.py
+            known = ([".venv/bin/activate"], ["install/setup.sh"], ["install", "./clients/js"])
+            assert arguments in known, where
         case _:
             check_ros(command, where)
 
@@ -189,7 +190,7 @@ def test_json_is_protocol(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_every_block_says_what_becomes_of_it(page: Path) -> None:
     fences = re.findall(r"^```(.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    assert set(fences[::2]) <= {"python", "sh", "json", "text"}
+    assert set(fences[::2]) <= {"python", "sh", "json", "text", "js"}  # js: test_js_docs.py
     assert set(fences[1::2]) <= {""}
 
 

@@ -23,7 +23,7 @@ def test_its_types_are_those_of_the_service(built: Path, tmp_path: Path) -> None
 
 
 def test_it_holds_what_users_need_and_nothing_else(desk: Path) -> None:  # noqa: F811
-    installed = desk / "node_modules" / "fervor"
+    installed = desk / "node_modules" / "fervor-client"
     package = json.loads((installed / "package.json").read_text())
     assert "dependencies" not in package
     assert package["license"] == "Apache-2.0"
@@ -38,7 +38,7 @@ def test_it_holds_what_users_need_and_nothing_else(desk: Path) -> None:  # noqa:
 def test_users_of_typescript_get_types(built: Path, desk: Path) -> None:  # noqa: F811
     """In Node and in a bundler for browsers, where the same names stand."""
     (desk / "user.ts").write_text(
-        'import { connect, type Estimate, FrameError, type Options } from "fervor";\n'
+        'import { connect, type Estimate, FrameError, type Options } from "fervor-client";\n'
         'const options: Options = { emotion: "joy", by_emotion: true, retryForS: Infinity };\n'
         'const session = await connect("ws://127.0.0.1:8080", options);\n'
         "const pose = new Float32Array(4 * session.joints.length);\n"

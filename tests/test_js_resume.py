@@ -1,7 +1,7 @@
 """A Node script streams on through a kill -9, a restart and a drain of the service: every estimate, to the bit."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import pytest
 import fervor_client
 from bodies import motion
 from js import Script, built, desk, script  # noqa: F401  # fixtures
-from live import Live
+from live import Live, running
 from test_proof_resume import served
 
 KEY = "a key for all the replicas"
@@ -22,6 +22,8 @@ POSES = {
     body: motion(FRAMES, seed=number).astype(np.float32).astype(np.float64)
     for number, body in enumerate(BODIES)
 }
+Told = dict[tuple[str, int], dict[str, Any]]
+
 OPTIONS = {"emotion": "joy", "checkpoint_s": 0.5, "by_emotion": True}
 
 
@@ -33,25 +35,18 @@ def poses(desk: Path) -> Path:  # noqa: F811
 
 
 @pytest.fixture(scope="module")
-def expected() -> Iterator[Callable[[str], dict[tuple[str, int], dict[str, Any]]]]:
+def expected() -> Told:
     """What the Python client is told by a service that nothing happens to."""
-    known: dict[str, dict[tuple[str, int], dict[str, Any]]] = {}
-
-    def told(url: str) -> dict[tuple[str, int], dict[str, Any]]:
-        if not known:
-            with fervor_client.sync.connect(url, **OPTIONS) as session:  # type: ignore[arg-type]
-                for seq in range(FRAMES):
-                    for body in BODIES:
-                        session.send(POSES[body][seq], body=body, seq=seq, t=seq / 40)
-                session.end()
-                known[""] = by_frame(json.loads(estimate.model_dump_json()) for estimate in session)
-        return known[""]
-
-    yield told
+    with running(max_frames_per_second=1e6) as live, fervor_client.sync.connect(live.stream, **OPTIONS) as session:  # type: ignore[arg-type]
+        for seq in range(FRAMES):
+            for body in BODIES:
+                session.send(POSES[body][seq], body=body, seq=seq, t=seq / 40)
+        session.end()
+        return by_frame(json.loads(estimate.model_dump_json()) for estimate in session)
 
 
-def by_frame(estimates: Any) -> dict[tuple[str, int], dict[str, Any]]:
-    told: dict[tuple[str, int], dict[str, Any]] = {}
+def by_frame(estimates: Any) -> Told:
+    told: Told = {}
     for estimate in estimates:
         key = (estimate["body"], estimate["seq"])
         assert key not in told, "each frame is answered once"
@@ -63,7 +58,7 @@ def asked(poses: Path, encoding: str, *waits: int) -> str:
     return json.dumps({"poses": str(poses), "waits": waits, "options": {**OPTIONS, "encoding": encoding}})
 
 
-def finish(running: Script) -> tuple[dict[str, Any], dict[tuple[str, int], dict[str, Any]]]:
+def finish(running: Script) -> tuple[dict[str, Any], Told]:
     last = running.hear(has="totals")
     return last, by_frame(last["estimates"])
 
@@ -73,8 +68,7 @@ def finish(running: Script) -> tuple[dict[str, Any], dict[tuple[str, int], dict[
 def test_every_estimate_of_a_stream_whose_service_was_killed_twice(
     desk: Path,  # noqa: F811
     poses: Path,
-    live: Live,
-    expected: Callable[[str], dict[tuple[str, int], dict[str, Any]]],
+    expected: Told,
     encoding: str,
 ) -> None:
     waits = (100, 170)
@@ -88,7 +82,7 @@ def test_every_estimate_of_a_stream_whose_service_was_killed_twice(
                 process, _ = services.enter_context(served(port))
                 running.tell()
             last, got = finish(running)
-    assert got == expected(live.stream)
+    assert got == expected
     assert len(got) == last["totals"]["estimates"] == FRAMES * len(BODIES)
     assert last["reconnects"] >= 2
     resumed = [news for news in running.said if news.get("reconnect")]
@@ -99,8 +93,7 @@ def test_every_estimate_of_a_stream_whose_service_was_killed_twice(
 def test_a_service_that_is_stopped_hands_over_to_the_next(
     desk: Path,  # noqa: F811
     poses: Path,
-    live: Live,
-    expected: Callable[[str], dict[tuple[str, int], dict[str, Any]]],
+    expected: Told,
     encoding: str,
 ) -> None:
     with ExitStack() as services:
@@ -114,7 +107,7 @@ def test_a_service_that_is_stopped_hands_over_to_the_next(
             services.enter_context(served(port))
             running.tell()
             _, got = finish(running)
-    assert got == expected(live.stream)
+    assert got == expected
     assert not any(news.get("anew") for news in running.said)
 
 

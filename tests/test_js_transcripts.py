@@ -1,4 +1,4 @@
-"""The golden transcripts, all of them: the JavaScript client's transport and codecs play them against a real service."""
+"""The golden transcripts, all of them: the JavaScript client plays its half of them against a real service."""
 
 import threading
 from contextlib import ExitStack

@@ -10,7 +10,7 @@ import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { pathToFileURL } from "node:url";
 
-const inside = (name) => import(pathToFileURL(`node_modules/fervor/dist/${name}.js`));
+const inside = (name) => import(pathToFileURL(`node_modules/fervor-client/dist/${name}.js`));
 const { nodeDial } = await inside("node_web_socket");
 const { encodeFrame, Opcode } = await inside("web_socket_frames");
 const { CODECS } = await inside("codec");

@@ -1,6 +1,6 @@
 // Asks for a session that is not to be had, and prints why.
 
-import { connect } from "fervor";
+import { connect } from "fervor-client";
 
 const [url, options] = process.argv.slice(2);
 try {

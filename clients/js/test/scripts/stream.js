@@ -6,7 +6,7 @@
 
 import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
-import { connect } from "fervor";
+import { connect } from "fervor-client";
 
 const RATE_HZ = 40;
 const [url, given] = process.argv.slice(2);
