@@ -145,7 +145,8 @@ class NodeConnection implements Connection {
       if (!(error instanceof Violation)) throw error;
       this.#close ??= { code: error.code, reason: error.message };
       this.#goodbye(error.code, error.message);
-      this.#socket.destroy();
+      this.#socket.removeAllListeners("data").resume(); // no more can be understood
+      this.#socket.end();
     }
   }
 

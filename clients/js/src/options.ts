@@ -109,5 +109,6 @@ function checkNumbers(start: SessionStart): void {
 }
 
 function wrong(name: string, value: unknown, expected: string): InputError {
-  return new InputError(`${name} is ${JSON.stringify(value) ?? String(value)}; expected ${expected}`);
+  const shown = typeof value === "string" ? JSON.stringify(value) : String(value);
+  return new InputError(`${name} is ${shown}; expected ${expected}`);
 }
