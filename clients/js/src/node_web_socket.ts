@@ -10,7 +10,7 @@ import { TextDecoder } from "node:util";
 import type { Address, Connection, Dial, Listener } from "./connection.ts";
 import { InputError, Unreachable } from "./errors.ts";
 import { type Close, type Refusal, refused } from "./failures.ts";
-import { encodeClose, encodeFrame, FrameReader, Opcode, type Piece, Violation } from "./web_socket_frames.ts";
+import { encodeClose, encodeFrame, FrameReader, Opcode, type Piece, Violation } from "./node_web_socket_frames.ts";
 
 /** TLS settings for `wss://`, as `node:https` takes them. */
 export type Tls = Pick<

@@ -12,7 +12,7 @@ import type { Address } from "../src/connection.ts";
 import { InputError, Unreachable } from "../src/errors.ts";
 import type { Close } from "../src/failures.ts";
 import { nodeDial } from "../src/node_web_socket.ts";
-import { encodeFrame, FrameReader, MOST_BYTES, Opcode, Violation } from "../src/web_socket_frames.ts";
+import { encodeFrame, FrameReader, MOST_BYTES, Opcode, Violation } from "../src/node_web_socket_frames.ts";
 
 /** What comes to a client, and where its connection goes to. */
 class Ear {

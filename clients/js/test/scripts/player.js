@@ -12,7 +12,7 @@ import { pathToFileURL } from "node:url";
 
 const inside = (name) => import(pathToFileURL(`node_modules/fervor-client/dist/${name}.js`));
 const { nodeDial } = await inside("node_web_socket");
-const { encodeFrame, Opcode } = await inside("web_socket_frames");
+const { encodeFrame, Opcode } = await inside("node_web_socket_frames");
 const { CODECS } = await inside("codec");
 const { unpack } = await inside("msgpack");
 const { closed, told } = await inside("failures");
