@@ -31,6 +31,9 @@ from fervor_client.retrying import Reconnect, Retries
 CODEC = CODECS["fervor.v1.json"]
 KEY = Sealer((b"key",), 300.0)
 POSES = motion(400)
+STRANGE = SkeletonSpec(
+    name="strange", joints=SEGMENTS, parents=(-1,) * 14, segments={n: n for n in SEGMENTS}, axes="global"
+)
 
 
 class Service:
@@ -316,10 +319,7 @@ def test_a_service_that_gives_no_checkpoints_is_told_everything_again_while_it_f
 
 
 def test_a_calibrated_session_resumes_under_its_new_alignment():
-    strange = SkeletonSpec(
-        name="strange", joints=SEGMENTS, parents=(-1,) * 14, segments={n: n for n in SEGMENTS}, axes="global"
-    )
-    start = opening(strange, "joy", Options(checkpoint_s=0.3), resume=True)
+    start = opening(STRANGE, "joy", Options(checkpoint_s=0.3), resume=True)
     turned = np.tile([0.5, 0.5, 0.5, 0.5], (14, 1))
 
     def life(cuts: set[int]) -> Robot:
@@ -339,6 +339,43 @@ def test_a_calibrated_session_resumes_under_its_new_alignment():
     assert [news.anew for news in torn.reconnects if news.delay_s is None] == [()] * 4
     close = life({27})  # before the first checkpoint of the new terms
     assert [estimate.seq for estimate in close.by_body()["ann"]] == list(range(90))
+
+
+def test_a_body_that_ends_while_a_resume_is_under_way_is_a_new_one_after_it():
+    def life(*, cut: bool) -> list[Estimate]:
+        robot = Robot(checkpoint_s=0.3)
+        frames(robot, range(20))
+        if cut:
+            robot.cut()  # the new service has been told the checkpoint, and not yet answered
+        robot.conversation.end_body("ann")
+        frames(robot, range(20, 30))
+        assert robot.conversation.reconnects == cut
+        return robot.read()
+
+    assert life(cut=True) == life(cut=False)
+
+
+def test_a_checkpoint_after_a_calibration_counts_though_it_names_the_frame_of_the_one_before():
+    start = opening(STRANGE, "joy", Options(checkpoint_s=60.0), resume=True)
+    held = np.tile([0.5, 0.5, 0.5, 0.5], (14, 1))
+
+    def life(*, cut: bool) -> dict[str, list[Estimate]]:
+        robot = Robot(start=start)
+        robot.conversation.frame(held, body="bob", t=0.0)  # with a checkpoint
+        robot.settle()
+        robot.conversation.calibrate(SessionCalibrate(body="ann", seconds=0.5))
+        for number in range(20):
+            robot.conversation.frame(held, body="ann", t=number / 30)
+        robot.settle()
+        if cut:
+            robot.cut()
+            robot.settle()
+            assert robot.reconnects[-1].anew == ()
+        robot.conversation.frame(held, body="bob", t=0.7)
+        robot.settle()
+        return robot.by_body()
+
+    assert life(cut=True) == life(cut=False)
 
 
 def test_delivery_latest_gives_rising_numbers_and_the_newest():

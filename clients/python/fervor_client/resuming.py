@@ -58,6 +58,7 @@ class Log:
         self._calibrate: Entry | None = None
         self._held = ""  # the body whose frames it rests on
         self._place = 0
+        self._stale: tuple[str, ...] = ()  # bodies that the service resumed, and that are none any more
 
     # --- what is sent -------------------------------------------------------------------------------------------------
 
@@ -126,7 +127,7 @@ class Log:
         track = self._tracks.get(message.body)
         if track is None:
             return
-        if not track.token or message.seq != track.seq:
+        if message.seq != track.seq:
             covered = next((entry for entry in track.entries if self._covers(message, entry)), None)
             if covered is None:
                 return
@@ -144,7 +145,8 @@ class Log:
         """New terms are in force: checkpoints of the old ones are void, and the bodies were reset."""
         self.calibration_failed()
         for track in self._tracks.values():
-            track.give_up()
+            if not track.untouched:
+                track.give_up()
 
     def calibration_failed(self) -> None:
         """Nothing came of it."""
@@ -175,11 +177,12 @@ class Log:
         return bool(refused)
 
     def resumed(self, bodies: Iterable[Resumed]) -> None:
-        """The service goes on with these bodies only."""
-        known = {(body.body, body.seq) for body in bodies}
+        """The service goes on with these only; what ended, or was given up, since it was asked must end there too."""
+        known = {body.body: body.seq for body in bodies}
         for name, track in self._tracks.items():
-            if track.token and (name, track.seq) not in known:
+            if track.token and track.seq != known.get(name):
                 track.give_up()
+        self._stale = tuple(name for name in known if name not in self._tracks or not self._tracks[name].token)
 
     def replay(self) -> tuple[list[Payload], list[Key]]:
         """What to send again, in order, and which of it are frames that were answered before."""
@@ -190,7 +193,8 @@ class Log:
             again.append((self._calibrate, ""))
         again.sort(key=lambda pair: pair[0].place)
         echoes = [(name, entry.seq) for entry, name in again if entry.seq is not None and entry.answered]
-        return [entry.payload for entry, _ in again], echoes
+        ends = [self._codec.encode(BodyEnd(body=name)) for name in self._stale]
+        return [*ends, *(entry.payload for entry, _ in again)], echoes
 
     def _prepare(self, name: str, track: Track) -> None:
         """Drop what a service without this body's checkpoint has no use for."""

@@ -37,7 +37,7 @@ class Track:
     """Since the checkpoint or, without one, since the body came."""
     token: str = ""
     seq: int = -1
-    """Newest frame that the checkpoint covers."""
+    """Newest frame that the checkpoint covers; without one, that the entries follow, where there is one."""
     since: float = 0.0  # seconds, when the checkpoint came
     whole: bool = True
     """Checkpoint and entries are all there is to know; else entries are missing between the two."""
@@ -50,6 +50,11 @@ class Track:
     """The label that answered frames left in force."""
     unlabelled: bool = False
     """The service lost that label."""
+
+    @property
+    def untouched(self) -> bool:
+        """Whether nothing of it was answered: all of it is still to come."""
+        return self.whole and not self.token and not any(entry.answered for entry in self.entries)
 
     def label_at(self, time: float, ttl_s: float | None) -> Emotion | None:
         """The label in force at `time`, before any frame under way."""
@@ -79,7 +84,7 @@ class Track:
 
     def give_up(self) -> None:
         """This body can't be resumed until its next checkpoint: only what that one may not cover is kept."""
-        self.token, self.seq, self.whole = "", -1, False
+        self.token, self.whole = "", False
         newest = next((entry for entry in reversed(self.entries) if entry.answered), None)
         if newest is not None:
             self._drop_before(newest)
@@ -88,7 +93,7 @@ class Track:
         """The service knows nothing of this body: begin with its first frame, if incomplete with an unanswered one."""
         whole = self.whole
         self.entries = deque(dropwhile(lambda entry: entry.seq is None or (entry.answered and not whole), self.entries))
-        self.whole = True
+        self.seq, self.whole = -1, True
         self.here = self.here and bool(self.entries) and not self.entries[-1].ends
         self.unlabelled = not self.entries and self.label is not None
 
@@ -113,3 +118,4 @@ class Track:
         """Drop what stands before an answered entry, except frames under way."""
         while self.entries and (first := self.entries[0]) is not entry and (first.answered or first.seq is None):
             self.entries.popleft()
+            self.seq = -1
