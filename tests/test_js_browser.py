@@ -13,6 +13,8 @@ from live import Live
 from sites import browsing, site
 from test_client_reconnect import network
 
+pytestmark = pytest.mark.timeout(300)  # the first one builds, packs and installs the client
+
 POSES = motion(120).tolist()
 TOKEN = "a-long-secret"
 

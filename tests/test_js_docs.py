@@ -11,6 +11,8 @@ from live import Live
 from pages import DOCS, blocks, section, table
 from sites import browsing, site
 
+pytestmark = pytest.mark.timeout(300)  # the first one builds, packs and installs the client
+
 SERVICE = "127.0.0.1:8080"
 README = CLIENT / "README.md"
 PAGE = DOCS / "how-to" / "javascript.md"

@@ -3,11 +3,15 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from js import CLIENT, built, desk, run  # noqa: F401  # fixtures
+
+pytestmark = pytest.mark.timeout(300)  # the first one builds, packs and installs the client
 
 
 def test_its_own_tests_pass(built: Path) -> None:  # noqa: F811
-    run("npm", "test", cwd=built)
+    run("npm", "test", cwd=built, timeout=280)
 
 
 def test_its_style_is_kept(built: Path) -> None:  # noqa: F811

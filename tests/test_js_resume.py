@@ -13,7 +13,10 @@ import fervor_client
 from bodies import motion
 from js import Script, built, desk, script  # noqa: F401  # fixtures
 from live import Live, running
+from test_client_reconnect import network
 from test_proof_resume import served
+
+pytestmark = pytest.mark.timeout(300)  # the first one builds, packs and installs the client
 
 KEY = "a key for all the replicas"
 BODIES, FRAMES = "abc", 240
@@ -54,8 +57,8 @@ def by_frame(estimates: Any) -> Told:
     return told
 
 
-def asked(poses: Path, encoding: str, *waits: int) -> str:
-    return json.dumps({"poses": str(poses), "waits": waits, "options": {**OPTIONS, "encoding": encoding}})
+def asked(poses: Path, encoding: str, *waits: int, **options: int) -> str:
+    return json.dumps({"poses": str(poses), "waits": waits, "options": {**OPTIONS, **options, "encoding": encoding}})
 
 
 def finish(running: Script) -> tuple[dict[str, Any], Told]:
@@ -64,7 +67,6 @@ def finish(running: Script) -> tuple[dict[str, Any], Told]:
 
 
 @pytest.mark.parametrize("encoding", ["json", "msgpack"])
-@pytest.mark.timeout(180)
 def test_every_estimate_of_a_stream_whose_service_was_killed_twice(
     desk: Path,  # noqa: F811
     poses: Path,
@@ -109,6 +111,22 @@ def test_a_service_that_is_stopped_hands_over_to_the_next(
             _, got = finish(running)
     assert got == expected
     assert not any(news.get("anew") for news in running.said)
+
+
+@pytest.mark.parametrize("encoding", ["json", "msgpack"])
+def test_a_line_that_is_cut_in_mid_message_over_and_over_changes_nothing(
+    desk: Path,  # noqa: F811
+    poses: Path,
+    start_service: Callable[..., Live],
+    expected: Told,
+    encoding: str,
+) -> None:
+    with network(start_service(max_frames_per_second=1e6)) as line:
+        line.most_bytes = (60_000, 120_000)
+        with script(desk, "stream.js", line.url, asked(poses, encoding, window=16)) as running:
+            last, got = finish(running)
+    assert got == expected
+    assert last["reconnects"] >= 2
 
 
 def test_a_wrong_token_is_refused_and_the_right_one_is_not(

@@ -10,6 +10,8 @@ from js import built, desk, script  # noqa: F401  # fixtures
 from live import running
 from transcripts import FOLDER, load
 
+pytestmark = pytest.mark.timeout(300)  # the first one builds, packs and installs the client
+
 PATHS = sorted(FOLDER.glob("*.jsonl"))
 
 

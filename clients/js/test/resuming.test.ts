@@ -106,7 +106,7 @@ for (const encoding of ["json", "msgpack"] as const) {
           assert.equal(torn.robot.conversation.inFlight, 0);
           assert.equal(torn.robot.conversation.state, "open");
         }),
-        { numRuns: 300 },
+        { numRuns: 150 },
       );
     });
   }
@@ -128,7 +128,7 @@ test("under delivery latest every frame counts as answered, and the newest is to
           );
       }
     }),
-    { numRuns: 200 },
+    { numRuns: 150 },
   );
 });
 
