@@ -12,15 +12,20 @@ type Action =
   | { kind: "reset" | "end" | "calibrate"; body: string }
   | { kind: "send" | "listen" | "hear" | "cut" };
 
+const LONGEST = 150;
+
+/** So brief that nobody is away for long in the longest story. */
+const BRIEF = [0.02, 0.06]; // seconds; LONGEST of them are less than IDLE_S
+
 const body = fc.constantFrom("ann", "bob", "cyd");
 
 /** Frames, some of which are refused, late, or come after a body was away for long. */
-const frames = (odd: { x: number[]; after: number[] }) =>
+const frames = (odd: { x: number[]; steps: number[]; after: number[] }) =>
   fc.record({
     kind: fc.constant("frame" as const),
     body,
     x: fc.oneof({ weight: 30, arbitrary: fc.integer({ min: 0, max: 8 }) }, ...odd.x.map((x) => fc.constant(x))),
-    after: fc.oneof({ weight: 30, arbitrary: fc.constantFrom(0.1, 0.3) }, ...odd.after.map((s) => fc.constant(s))),
+    after: fc.oneof({ weight: 30, arbitrary: fc.constantFrom(...odd.steps) }, ...odd.after.map((s) => fc.constant(s))),
     emotion: fc.option(fc.constantFrom("joy", "fear"), { nil: undefined, freq: 6 }),
   });
 
@@ -34,9 +39,9 @@ const calibrate = fc.record({ kind: fc.constant("calibrate" as const), body });
  * service forget them (see Log), and one that comes back in a resume after a calibration is flagged `reset` too.
  */
 const kinds = {
-  refused: [frames({ x: [9], after: [-0.05] }), goes, calibrate],
-  away: [frames({ x: [], after: [11, -0.05] }), goes],
-  alone: [frames({ x: [9], after: [-0.05] })],
+  refused: [frames({ x: [9], steps: BRIEF, after: [-0.05] }), goes, calibrate],
+  away: [frames({ x: [], steps: [0.1, 0.3], after: [11, -0.05] }), goes],
+  alone: [frames({ x: [9], steps: BRIEF, after: [-0.05] })],
 } as const;
 function actions(odd: keyof typeof kinds): fc.Arbitrary<Action[]> {
   const [frame, ...others] = kinds[odd];
@@ -46,7 +51,7 @@ function actions(odd: keyof typeof kinds): fc.Arbitrary<Action[]> {
     { weight: 1, arbitrary: cut },
     ...others.map((arbitrary) => ({ weight: 1, arbitrary })),
   );
-  return fc.array(action as fc.Arbitrary<Action>, { maxLength: 150, size: "max" });
+  return fc.array(action as fc.Arbitrary<Action>, { maxLength: LONGEST, size: "max" });
 }
 
 class Story {
