@@ -1,8 +1,5 @@
 // The client's side of the protocol: what to send, and which frame an answer belongs to. No socket, no timer.
 //
-// NEW ──start──▶ STARTING ──session.started──▶ OPEN ──end──▶ ENDING ──session.ended──▶ CLOSED
-// └──────── fatal error, connection lost for good, from any state ─────▲
-//
 // Rules: `start` first, then frames · a frame is answered by one estimate or one error that names it · answers are
 // matched by body and seq, in whatever order they come · a recoverable error concerns one message, the conversation goes
 // on · a fatal one ends it; what was answered before can still be read.
@@ -29,9 +26,7 @@ import { Log } from "./log.ts";
 import type * as messages from "./messages.ts";
 import type { Pose } from "./poses.ts";
 import type { Reconnect, Retries } from "./retries.ts";
-
-/** Where a conversation stands. */
-export type State = "new" | "starting" | "open" | "ending" | "closed";
+import { Standing } from "./standing.ts";
 
 /** What a caller is told by callbacks: a recoverable error that nobody awaits, or how a reconnect goes. */
 export type News = FervorError | Reconnect;
@@ -63,16 +58,8 @@ export interface Opening {
  * order; hand every message that comes to `receive`; call `interrupted` when a connection is gone or could not be had,
  * and `lost` when there shall be none.
  */
-export class Conversation {
-  readonly url: string;
+export class Conversation extends Standing {
   readonly codec: Codec;
-  state: State = "new";
-  /** Why the conversation ended, unless both sides wanted it to. */
-  failure: FervorError | undefined;
-  /** What the session came to, once it has ended. */
-  totals: messages.Totals | undefined;
-  /** The newest one: a resume brings another. */
-  started: messages.SessionStarted | undefined;
   #start: messages.SessionStart;
   readonly #framer: Framer;
   readonly #answers: Answers;
@@ -82,7 +69,7 @@ export class Conversation {
   constructor({ start, encoding, url, retries, now, warn, mostKept }: Opening) {
     const latest = start.delivery === "latest";
     const timed = start.clock !== "frames";
-    this.url = url;
+    super(url);
     this.codec = CODECS[encoding];
     this.#start = start;
     this.#framer = new Framer(encoding, timed ? now : undefined);
@@ -90,11 +77,6 @@ export class Conversation {
     const keeps = retries !== undefined;
     const log = new Log({ latest, emotionTtlS: start.emotion_ttl_s, idles: timed, keeps, mostKept, now, warn });
     this.#line = new Line(log, retries, now);
-  }
-
-  /** Whether nothing more will come. */
-  get over(): boolean {
-    return this.state === "closed";
   }
 
   /** Whether there is a connection on which the session goes on. */
@@ -253,8 +235,7 @@ export class Conversation {
   /** The conversation is over; `failure` says why, undefined that it was meant to be. */
   lost(failure: FervorError | undefined): void {
     if (this.over) return;
-    this.state = "closed";
-    this.failure = failure;
+    this.close(failure);
     const unanswered = failure ?? new Unreachable(`the session with ${this.url} ended before this was answered`);
     this.#answers.abandon(unanswered);
     this.#settleCalibration((waiter) => waiter.reject(unanswered));
@@ -275,14 +256,6 @@ export class Conversation {
   /** Nobody awaits the calibration any more; it may still come into force. */
   giveUpCalibration(): void {
     this.#calibration = { resolve() {}, reject() {} };
-  }
-
-  /** What the service said at the start; throws why nothing can be sent, unless something can. */
-  mustBeOpen(): messages.SessionStarted {
-    if (this.state === "open" && this.started !== undefined) return this.started;
-    if (this.failure !== undefined) throw this.failure;
-    const what = this.state === "new" || this.state === "starting" ? "has not started" : "has ended; connect again";
-    throw new Unreachable(`the session with ${this.url} ${what}`);
   }
 
   /** The message; null if a newer service says what this client does not know, or nothing that makes sense. */

@@ -13,6 +13,7 @@ type Action =
   | { kind: "send" | "listen" | "hear" | "cut" };
 
 const LONGEST = 150;
+const SEED = 7; // the same stories in every run
 
 /** So brief that nobody is away for long in the longest story. */
 const BRIEF = [0.02, 0.06]; // seconds; LONGEST of them are less than IDLE_S
@@ -35,11 +36,12 @@ const goes = fc.record({ kind: fc.constantFrom("reset" as const, "end" as const)
 const calibrate = fc.record({ kind: fc.constant("calibrate" as const), body });
 
 /**
- * What happens beside. Bodies are away in stories of their own: a frame that is refused is taken as one that made the
- * service forget them (see Log), and one that comes back in a resume after a calibration is flagged `reset` too.
+ * What happens beside, in stories of their own. With frames that are refused nobody is away: they are taken as frames
+ * that made the service forget others (see Log). With a calibration nobody is away, and nothing is late: a cut between
+ * `session.calibrated` and the checkpoints after it begins bodies anew, and the service knows no older frame then.
  */
 const kinds = {
-  refused: [frames({ x: [9], steps: BRIEF, after: [-0.05] }), goes, calibrate],
+  refused: [frames({ x: [9], steps: BRIEF, after: [] }), goes, calibrate],
   away: [frames({ x: [], steps: [0.1, 0.3], after: [11, -0.05] }), goes],
   alone: [frames({ x: [9], steps: BRIEF, after: [-0.05] })],
 } as const;
@@ -111,7 +113,7 @@ for (const encoding of ["json", "msgpack"] as const) {
           assert.equal(torn.robot.conversation.inFlight, 0);
           assert.equal(torn.robot.conversation.state, "open");
         }),
-        { numRuns: 150 },
+        { numRuns: 150, seed: SEED, endOnFailure: true },
       );
     });
   }
@@ -133,7 +135,7 @@ test("under delivery latest every frame counts as answered, and the newest is to
           );
       }
     }),
-    { numRuns: 150 },
+    { numRuns: 150, seed: SEED, endOnFailure: true },
   );
 });
 
