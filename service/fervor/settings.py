@@ -32,6 +32,8 @@ LogLevel = Literal["critical", "error", "warning", "info", "debug"]
 
 LogFormat = Literal["text", "json"]
 
+Switch = Literal["on", "off"]
+
 Transport = Literal["direct", "asgi"]
 
 
@@ -66,6 +68,17 @@ class Settings(BaseSettings):
         description="web origins (`https://robot.local`), separated by commas, whose pages may use the service; `*` "
         "for all; its own always may",
     )
+    page: Switch = Field(
+        "on",
+        description="the live page at `/`, which shows the bodies of all sessions as they move: `on`, to whoever shows "
+        "a token (to everybody where there is none), or `off`",
+    )
+    page_tokens: Annotated[tuple[SecretStr, ...], NoDecode] = Field(
+        (),
+        description="tokens, separated by commas, of which somebody who watches the page must show one; empty: the "
+        "tokens of clients",
+    )
+    max_watchers: int = Field(8, ge=1, description="live pages open at once; one more is told to come later")
     model: Path | None = Field(None, description="model file (*.onnx); none: the demo model that comes with fervor")
 
     skeletons: Path | None = Field(None, description="folder with calibrated skeletons (*.json), known by their names")
@@ -129,7 +142,7 @@ class Settings(BaseSettings):
     drain_s: float = Field(5.0, ge=0, description="time that streams have to take their last checkpoints at the end")
     shutdown_grace_s: int = Field(10, ge=0, description="time that open connections have to end when the service stops")
 
-    @field_validator("tokens", "origins", "checkpoint_keys", mode="before")
+    @field_validator("tokens", "page_tokens", "origins", "checkpoint_keys", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         if isinstance(value, str):

@@ -22,6 +22,8 @@ from fervor.settings import Settings
 
 HOST = "127.0.0.1"
 
+TOKENS = ("FERVOR_TOKENS", "FERVOR_PAGE_TOKENS")
+
 START_S = 30.0
 """Longest wait for the service; it takes a second or two."""
 
@@ -45,7 +47,7 @@ def own_service(port: int = 0) -> Iterator[int]:
         NoService: it did not start; says what it said.
     """
     port = port or free_port()
-    environment = {name: value for name, value in os.environ.items() if name.upper() != "FERVOR_TOKENS"}
+    environment = {name: value for name, value in os.environ.items() if name.upper() not in TOKENS}
     with (
         tempfile.TemporaryFile() as said,
         subprocess.Popen(  # noqa: S603  # ourselves

@@ -16,6 +16,7 @@ from fervor.recordings.table_csv import csv_of
 from fervor.recordings.table_jsonl import jsonl_of
 from fervor.recordings.table_npz import npz_of
 from fervor.rotations import IDENTITY, slerp, to_rpy
+from fervor.skeletons.average_body import OFFSETS_CM, TIPS_CM
 from fervor.skeletons.rig import CHILD_SEGMENT, PARENT_SEGMENT, SEGMENTS
 
 Array = npt.NDArray[np.float64]
@@ -36,23 +37,6 @@ _BVH_NAMES: Mapping[str, str] = {
     "r_thigh": "RightUpLeg",
     "r_shank": "RightLeg",
 }
-_OFFSETS_CM: Mapping[str, tuple[float, float, float]] = {
-    "pelvis": (0, 95, 0),
-    "abdomen": (0, 12, 0),
-    "thorax": (0, 14, 0),
-    "head": (0, 32, 0),
-    "l_uparm": (18, 24, 0),
-    "l_forearm": (0, -29, 0),
-    "l_hand": (0, -26, 0),
-    "r_uparm": (-18, 24, 0),
-    "r_forearm": (0, -29, 0),
-    "r_hand": (0, -26, 0),
-    "l_thigh": (9, -3, 0),
-    "l_shank": (0, -43, 0),
-    "r_thigh": (-9, -3, 0),
-    "r_shank": (0, -43, 0),
-}
-_TIPS_CM: Mapping[str, float] = {"head": 18, "l_hand": -18, "r_hand": -18, "l_shank": -44, "r_shank": -44}
 _EVEN = 1e-6
 """Times are even where no step differs by more than this share from the mean."""
 
@@ -97,7 +81,7 @@ def bvh_of(recording: Recording) -> str:
     order = _tree_order()
     columns = np.array([CHILD_SEGMENT.index(segment) for segment in order if segment in CHILD_SEGMENT])
     turns = degrees[:, columns].reshape(len(local), -1)
-    root = " ".join(str(part) for part in (*_OFFSETS_CM["pelvis"], 0, 0, 0))
+    root = " ".join(str(part) for part in (*OFFSETS_CM["pelvis"], 0, 0, 0))
     rows = [f"{root} {' '.join(f'{value:.9f}' for value in row)}" for row in turns.tolist()]
     head = ["HIERARCHY", *_node(0, 0), "MOTION", f"Frames: {len(rows)}", f"Frame Time: {step:.9g}"]
     return "\n".join([*head, *rows]) + "\n"
@@ -138,7 +122,7 @@ def _tree_order(segment: int = 0) -> list[int]:
 def _node(segment: int, depth: int) -> list[str]:
     """The lines of a segment and all that hangs on it."""
     name, tab, deeper = SEGMENTS[segment], "\t" * depth, "\t" * (depth + 1)
-    offset = " ".join(str(part) for part in ((0, 0, 0) if depth == 0 else _OFFSETS_CM[name]))
+    offset = " ".join(str(part) for part in ((0, 0, 0) if depth == 0 else OFFSETS_CM[name]))
     channels = "3 Zrotation Yrotation Xrotation"
     lines = [
         f"{tab}{'JOINT' if depth else 'ROOT'} {_BVH_NAMES[name]}",
@@ -148,6 +132,6 @@ def _node(segment: int, depth: int) -> list[str]:
     ]
     for child in _children(segment):
         lines += _node(child, depth + 1)
-    if name in _TIPS_CM:
-        lines += [f"{deeper}End Site", f"{deeper}{{", f"{deeper}\tOFFSET 0 {_TIPS_CM[name]} 0", f"{deeper}}}"]
+    if name in TIPS_CM:
+        lines += [f"{deeper}End Site", f"{deeper}{{", f"{deeper}\tOFFSET 0 {TIPS_CM[name]} 0", f"{deeper}}}"]
     return [*lines, f"{tab}}}"]

@@ -6,8 +6,8 @@ from fastapi import Depends, FastAPI
 from fastapi.middleware.cors import CORSMiddleware
 
 from fervor import __version__
-from fervor.server import asyncapi, health, model, score, scrape, skeletons, stream
-from fervor.server.auth import require_token
+from fervor.server import asyncapi, convert, health, model, page, score, scrape, skeletons, stream, watch
+from fervor.server.auth import require_token, require_watcher
 from fervor.server.description import describe
 from fervor.server.lifespan import lifespan
 from fervor.server.problems import tell_problems
@@ -36,11 +36,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.service = service
     tell_problems(app)
-    for part in (stream, score, model, skeletons):
+    for part in (stream, score, convert, model, skeletons):
         app.include_router(part.router, dependencies=[Depends(require_token)])
     app.include_router(health.router)
     app.include_router(asyncapi.router)
     app.include_router(scrape.router)
+    if service.settings.page == "on":
+        app.include_router(watch.router, dependencies=[Depends(require_watcher)])
+        page.serve_page(app)
 
     if service.settings.origins:
         app.add_middleware(

@@ -35,6 +35,18 @@ async def require_token(connection: HTTPConnection) -> None:
         raise
 
 
+async def require_watcher(connection: HTTPConnection) -> None:
+    """Let somebody watch the live page, or not.
+
+    Raises:
+        OriginRefused: it comes from a web page that may not use the service.
+        AuthError: watchers need a token, and none of theirs was shown.
+    """
+    service = service_of(connection)
+    service.origins.check(connection.headers.get("origin"), connection.headers.get("host", ""))
+    service.page_tokens.holder(_shown(connection))
+
+
 def _shown(connection: HTTPConnection) -> Iterator[bytes]:
     """The tokens that a client shows, at most a few."""
     scheme, _, token = connection.headers.get("authorization", "").partition(" ")

@@ -171,6 +171,11 @@ class Conversation:
         """What it came to so far."""
         return self._session.totals
 
+    @property
+    def session(self) -> Session:
+        """What it is about, for who watches."""
+        return self._session
+
     def go_away(self, seconds: float) -> None:
         """The service stops: take no more frames, send the last checkpoints, and close with 1012 after them."""
         self._leaving = True

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from fervor.protocol.messages import Totals
 from fervor.server.traffic import Traffic
+from fervor.session.session import Session
 
 
 class Leaving(Protocol):
@@ -21,6 +22,10 @@ class Leaving(Protocol):
     @property
     def traffic(self) -> Traffic:
         """What went over the wire so far."""
+
+    @property
+    def session(self) -> Session:
+        """What it is about, for who watches."""
 
     def go_away(self, seconds: float) -> None:
         """Say so, send the last checkpoints, and close once they are out."""

@@ -20,6 +20,7 @@ from fervor.protocol.codec import one_sentence
 from fervor.protocol.messages import Frame, SessionStart
 from fervor.recordings.reader import read_recording
 from fervor.recordings.recording import Recording
+from fervor.recordings.table_jsonl import jsonl_of
 from fervor.scoring import Scorer, Take
 from fervor.server.model_info import model_info
 from fervor.server.recordings import score_recording
@@ -45,7 +46,7 @@ class Upload:
 
 
 class ScoringJobs:
-    """The two kinds of scoring request."""
+    """The kinds of request about whole recordings."""
 
     def __init__(
         self, model: Model, allowed: Allowed, skeletons: Mapping[str, Skeleton], *, row_multiple: int = 1
@@ -106,6 +107,17 @@ class ScoringJobs:
         self._check(len(uploads), sum(map(len, recordings)))
         metadata = self._model.metadata
         return self._answer(score_recording(self._scorer, metadata, recording, options) for recording in recordings)
+
+    def convert_file(self, body: bytes, filename: str, skeleton: str | None) -> bytes:
+        """A recording on the rig, as JSON lines.
+
+        Raises:
+            InputError: the file can't be used; says why.
+            TooLarge: more frames than allowed.
+        """
+        recording = _read_recording(Upload(filename, body), skeleton)
+        self._check(1, len(recording))
+        return jsonl_of(recording).encode()
 
     def _read_form(self, body: bytes, content_type: str) -> tuple[dict[str, str], list[Upload]]:
         """The fields of a form, and its files; no more of both than could be of use."""

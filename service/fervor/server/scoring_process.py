@@ -26,7 +26,7 @@ from fervor.settings import LogFormat, LogLevel
 
 log = logging.getLogger(__name__)
 
-Job = Literal["score", "score_files"]
+Job = Literal["score", "score_files", "convert_file"]
 """A method of `ScoringJobs`."""
 
 LENGTH = struct.Struct("!Q")

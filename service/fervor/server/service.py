@@ -22,6 +22,7 @@ from fervor.server.sessions import Sessions
 from fervor.server.shedding import Shedding
 from fervor.server.tokens import Tokens
 from fervor.server.tracing import Tracing
+from fervor.server.watchers import Watchers
 from fervor.session.host import Host
 from fervor.settings import Settings
 
@@ -38,6 +39,7 @@ class Service:
     batcher: Batcher
     host: Host
     tokens: Tokens
+    page_tokens: Tokens
     origins: Origins
     connections: Connections
     sessions: Sessions
@@ -48,6 +50,7 @@ class Service:
     probe: Probe
     scoring: ScoringProcess
     tracing: Tracing
+    watchers: Watchers
 
     @classmethod
     def open(cls, settings: Settings) -> "Service":
@@ -68,12 +71,14 @@ class Service:
         scoring = _scoring(settings, path, model, multiple)
         metrics = Metrics(model, batcher, drain=drain, connections=connections, scoring=scoring)
         slots = engine.slots
+        tokens = Tokens.from_settings(settings)
         return cls(
             settings=settings,
             model=model,
             batcher=batcher,
             host=_host(settings, model, engine),
-            tokens=Tokens.from_settings(settings),
+            tokens=tokens,
+            page_tokens=Tokens.of_watchers(settings, tokens),
             origins=Origins(settings.origins),
             connections=connections,
             sessions=Sessions(settings, slots=slots, drain=drain, shedding=shedding, metrics=metrics),
@@ -84,6 +89,7 @@ class Service:
             probe=Probe(batcher),
             scoring=scoring,
             tracing=Tracing.from_environment(),
+            watchers=Watchers(settings.max_watchers),
         )
 
 

@@ -48,6 +48,12 @@ class Tokens:
         path = settings.tokens_file
         return cls(fixed, None if path is None else WatchedFile(path, parse_tokens))
 
+    @classmethod
+    def of_watchers(cls, settings: Settings, clients: "Tokens") -> "Tokens":
+        """The tokens of those who watch the live page: their own, or else those of clients."""
+        own = [Token.of(token.get_secret_value()) for token in settings.page_tokens]
+        return cls(own) if own else clients
+
     def holder(self, shown: Iterable[bytes]) -> str | None:
         """The name of the client that shows these tokens; None where everybody may in.
 

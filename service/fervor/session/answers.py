@@ -45,6 +45,11 @@ class Answers:
             self._newest.popitem(last=False)
         return False
 
+    @property
+    def newest(self) -> Estimate | None:
+        """What was answered last; None before the first answer."""
+        return next(reversed(self._given.values()), None)
+
     def find(self, seq: int) -> Estimate | None:
         """The answer that a frame of this number got; None if it is under way, forgotten or never came."""
         return self._given.get(seq) if seq in self._newest else None

@@ -66,6 +66,11 @@ class Body:
         """Time of its newest frame, seconds on the client's clock."""
         return self._last
 
+    @property
+    def newest(self) -> Estimate | None:
+        """Its newest estimate; None while the engine has run nothing for it, and its slot may hold another's pose."""
+        return self._answers.newest
+
     def reset(self, flag: Flag = "reset") -> None:
         """Forget poses, states and level; the next frame is a first one and says so."""
         self._timeline = None

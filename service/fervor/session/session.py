@@ -5,7 +5,7 @@ every `Ticket` to the engine in order and hand each outcome to `conclude`; call 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 from fervor.emotions import emotion_vector
@@ -35,7 +35,7 @@ from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
 from fervor.session.calibrating import Calibrating
 from fervor.session.checkpoint import Bond, pack, unpack
-from fervor.session.events import Close, Event, Outcome, Pose, Reply, Restore, Ticket
+from fervor.session.events import Close, Event, Outcome, Pose, Reply, Restore, Source, Ticket
 from fervor.session.groups import Groups
 from fervor.session.host import Host
 from fervor.session.roster import Roster
@@ -63,6 +63,16 @@ class Session:
     def totals(self) -> Totals:
         """What the session came to so far."""
         return Totals(**self._totals)
+
+    @property
+    def bodies(self) -> Iterable[Body]:
+        """The bodies that it follows, in the order in which they came."""
+        return self._roster
+
+    @property
+    def source(self) -> Source | None:
+        """What kind of joints it gets; None before its start."""
+        return None if self._agreement is None else self._agreement.terms.source
 
     def receive(self, message: ClientMessage) -> list[Event]:
         """What a message brings. Errors come back as replies; a fatal one is followed by `Close`."""
