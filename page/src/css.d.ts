@@ -1,0 +1,3 @@
+// Style sheets that esbuild puts beside the bundle.
+
+declare module "*.css";

@@ -1,0 +1,38 @@
+// The intensity of one motion under every emotion, as bars; asked of the service while it is open.
+
+import { make, say } from "./elements.ts";
+import type { SeenBody } from "./messages.ts";
+
+export class Emotions {
+  readonly element = make("details", "emotions", make("summary", "", "Under every emotion"));
+  readonly #rows = new Map<string, { row: HTMLElement; bar: HTMLMeterElement; number: HTMLElement }>();
+  readonly #list = make("ul");
+
+  constructor(emotions: readonly string[], changed: () => void) {
+    for (const emotion of emotions) {
+      const [bar, number] = [make("meter"), make("span", "number")];
+      bar.max = 1;
+      bar.ariaLabel = emotion;
+      const row = make("li", "", make("span", "name", emotion), bar, number);
+      this.#rows.set(emotion, { row, bar, number });
+      this.#list.append(row);
+    }
+    this.element.append(this.#list);
+    this.element.addEventListener("toggle", changed);
+  }
+
+  get wanted(): boolean {
+    return this.element.open;
+  }
+
+  show(body: SeenBody): void {
+    if (!body.by_emotion) return;
+    for (const [emotion, value] of Object.entries(body.by_emotion)) {
+      const parts = this.#rows.get(emotion);
+      if (!parts) continue;
+      parts.bar.value = value;
+      say(parts.number, value.toFixed(2));
+      parts.row.toggleAttribute("data-shown", emotion === body.emotion);
+    }
+  }
+}
