@@ -11,6 +11,12 @@ COPY export export
 COPY clients/python clients/python
 COPY clients/pepper clients/pepper
 COPY bench/fervor_bench bench/fervor_bench
+COPY clients/js/src clients/js/src
+COPY page page
+# The live page, unless it came with the sources; without it, and without a network to build it, the service runs as well.
+RUN test -f service/fervor/server/page_files/index.html \
+ || { python -m venv /opt/node && PYTHON=/opt/node/bin/python page/make; } \
+ || echo "the image has no live page"
 # Compiled here once: the container can't write, and a replica that comes back should not spend its start on it.
 RUN python -m pip --python /opt/fervor/bin/python install --no-cache-dir --disable-pip-version-check \
       --constraint constraints.txt '.[serve]' \

@@ -8,14 +8,22 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check install --quiet --con
 # Slow proofs run in CI; `make test MARKS=` runs them here.
 MARKS  ?= $(if $(CI),,-m "not slow")
 
-.PHONY: help run test lint types js audit bench soak clean
+.PHONY: help run page test lint types js audit bench soak clean
 .DEFAULT_GOAL := help
 
 help: ## what there is to say
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
-run: $(VENV)/serve.stamp ## start the service, stream a sample to it, show the live meter
+run: $(VENV)/serve.stamp ## start the service, stream a sample to it, show the live meter; the page is at its address
+	@$(MAKE) --no-print-directory page >/dev/null 2>&1 || echo "the live page could not be built; make page says why"
 	@$(BIN)/fervor demo || [ $$? -eq 130 ]  # Ctrl-C is the way to stop it
+
+PAGE := service/fervor/server/page_files/index.html
+
+page: $(PAGE) ## build the live page into the package, with Node 20 or newer, or else PyPI's
+
+$(PAGE): $(shell find page clients/js/src -type f -not -path '*/node_modules/*') | $(BIN)/python
+	@PYTHON="$(abspath $(BIN)/python)" page/make
 
 test: $(VENV)/dev.stamp ## run the tests
 	@$(BIN)/python -m pytest $(MARKS)
@@ -57,8 +65,8 @@ soak: $(VENV)/dev.stamp ## a service under churn for SECONDS=600: fails if it gr
 	@$(BIN)/python -m bench.soak --seconds $(SECONDS)
 
 clean: ## forget the environment and everything made
-	rm -rf $(VENV) .venv-face .venv-ros build dist $(JS)/build $(JS)/dist $(JS)/node_modules .mypy_cache .ruff_cache \
-	  .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-face .venv-ros build dist $(JS)/build $(JS)/dist $(JS)/node_modules page/node_modules $(dir $(PAGE))
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -7,7 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from fervor.server.page import built_page
 
 FLAGS = (
     "--no-sandbox",
@@ -24,15 +26,25 @@ FLAGS = (
 DESKTOP = {"width": 1280, "height": 900}
 PHONE = {"width": 390, "height": 844}
 
+PATIENCE_MS = 60_000
+"""Drawing in software on a busy machine takes its time."""
 
-def chromium() -> str:
-    """The program; a test without it is skipped, except in CI."""
-    found = shutil.which("chromium") or shutil.which("google-chrome")
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail("no Chromium is here")
-        pytest.skip("no Chromium is here")
-    return found
+
+def need_page() -> None:
+    """The built page and a browser; a test without them is skipped, except in CI."""
+    for there, what in (
+        ((built_page() / "index.html").is_file(), "the live page is not built"),
+        (chromium(), "no Chromium is here"),
+    ):
+        if not there:
+            if os.environ.get("CI"):
+                pytest.fail(what)
+            pytest.skip(what)
+
+
+def chromium() -> str | None:
+    """The browser's program."""
+    return shutil.which("chromium") or shutil.which("google-chrome")
 
 
 def fake_camera(film: Path) -> tuple[str, ...]:
@@ -45,24 +57,41 @@ def fake_camera(film: Path) -> tuple[str, ...]:
 
 
 @contextmanager
-def browsing(*flags: str, **options) -> Iterator[BrowserContext]:
-    """A browser that knows nothing yet."""
+def browsing(*flags: str) -> Iterator[Browser]:
+    """A browser."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium(), args=[*FLAGS, *flags])
         try:
-            yield browser.new_context(**{"viewport": DESKTOP, **options})
+            yield browser
         finally:
             browser.close()
 
 
-class Watched:
-    """A page, with all that it complained of and asked for."""
+class Visit:
+    """A page that somebody looks at, with all that it complained of and asked for."""
 
-    def __init__(self, page: Page) -> None:
-        self.page = page
+    def __init__(self, browser: Browser, url: str, **options) -> None:
+        self.context = browser.new_context(**{"viewport": DESKTOP, **options})
+        self.context.set_default_timeout(PATIENCE_MS)
+        self.url = url
         self.complaints: list[str] = []
         self.asked: set[str] = set()
-        page.on("console", lambda said: said.type in ("error", "warning") and self.complaints.append(said.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("request", lambda request: self.asked.add(request.url))
-        page.on("websocket", lambda socket: self.asked.add(socket.url))
+        self.page: Page = self.context.new_page()
+        self.page.on("console", lambda said: said.type == "error" and self.complaints.append(said.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.asked.add(request.url))
+        self.page.on("websocket", lambda socket: self.asked.add(socket.url))
+        self.page.goto(url)
+
+    def wait_live(self) -> None:
+        self.page.locator("#link[data-state=live]").wait_for()
+        self.page.locator("#stream").wait_for()
+        self.page.wait_for_function("document.querySelectorAll('#emotion option').length > 1")
+
+    def card(self, body: str):
+        """The card of a body."""
+        return self.page.get_by_role("article", name=body, exact=True)
+
+    def until(self, condition: str, argument: object = None) -> object:
+        """Wait until a JavaScript function of the page gives something true."""
+        return self.page.wait_for_function(condition, arg=argument).json_value()

@@ -23,8 +23,8 @@ PROTOCOL = "fervor.v1.json"
 class Live:
     """A running service."""
 
-    def __init__(self, settings: Settings) -> None:
-        self.bound = bind("127.0.0.1", 0)
+    def __init__(self, settings: Settings, *, port: int = 0) -> None:
+        self.bound = bind("127.0.0.1", port)
         self.address = f"127.0.0.1:{self.bound.getsockname()[1]}"
         self.url = f"http://{self.address}"
         self.stream = f"ws://{self.address}/v1/stream"
@@ -58,8 +58,8 @@ class _Telling(Server):
 
 
 @contextmanager
-def running(**settings) -> Iterator[Live]:
-    live = Live(Settings.load(**settings))
+def running(*, port: int = 0, **settings) -> Iterator[Live]:
+    live = Live(Settings.load(**settings), port=port)
     live.start()
     try:
         yield live

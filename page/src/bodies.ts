@@ -8,6 +8,8 @@ import type { BodyName, SeenSession, Snapshot, WatchStarted } from "./messages.t
 
 const KEPT_S = 12; // a body that left stays readable for so long
 const PICTURE_S = 1 / 31;
+const BUDGET_MS = 20; // for drawing at once; where that is too little, bodies take turns
+const REST = 3; // a machine that draws slowly has better things to do for most of its time
 
 export class Bodies {
   readonly #cards = new Map<string, Card>();
@@ -17,7 +19,8 @@ export class Bodies {
   readonly #announcer: Announcer;
   #started: WatchStarted | undefined;
   #figure: Figure | undefined;
-  #drawn = 0;
+  #due = 0; // seconds
+  #turn = 0; // whose turn it is to be drawn
 
   /** `changed`: what is to be asked of the service may be another. */
   constructor(announcer: Announcer, changed: () => void) {
@@ -83,10 +86,16 @@ export class Bodies {
 
   #draw(now: number): void {
     requestAnimationFrame((time) => this.#draw(time / 1000));
-    const elapsed = now - this.#drawn;
-    if (elapsed < PICTURE_S) return;
-    this.#drawn = now;
-    for (const card of this.#cards.values()) if (isVisible(card.element)) card.draw(this.#figure, now, elapsed);
+    if (now < this.#due) return;
+    const began = performance.now();
+    const cards = [...this.#cards.values()];
+    for (const card of cards) card.write(now);
+    const visible = cards.filter(({ element }) => isVisible(element));
+    for (let count = 0; count < visible.length && performance.now() < began + BUDGET_MS; count++) {
+      this.#turn = (this.#turn + 1) % visible.length;
+      visible[this.#turn]?.draw(this.#figure, now);
+    }
+    this.#due = now + Math.max(PICTURE_S, (REST * (performance.now() - began)) / 1000);
   }
 }
 

@@ -31,6 +31,7 @@ export class Card {
   #shown: readonly Quaternion[] = [];
   #changed = -Infinity; // seconds, when the newest estimate came
   #read = -Infinity;
+  #drawn = -Infinity;
   #gone = false;
 
   constructor(body: SeenBody, started: WatchStarted, asked: () => void) {
@@ -84,16 +85,23 @@ export class Card {
     this.#gone = true;
   }
 
-  draw(figure: Figure | undefined, now: number, elapsed: number): void {
+  /** Bring the numbers up to date. */
+  write(now: number): void {
+    if (now - this.#read < READ_EVERY_S) return;
+    this.#read = now;
+    this.#write(now);
+  }
+
+  /** Draw figure and trace; `now` in seconds. */
+  draw(figure: Figure | undefined, now: number): void {
+    const elapsed = now - this.#drawn;
+    this.#drawn = now;
     const share = matchMedia("(prefers-reduced-motion: reduce)").matches ? 1 : 1 - Math.exp(-elapsed / SMOOTH_S);
     this.#shown = between(this.#shown, this.#body.q, share);
     const angle = (Number(this.#turn.value) * Math.PI) / 180;
     const { observed, level } = this.#body;
     figure?.draw(this.#canvas, { pose: this.#shown, observed, level, angle });
     this.#trace.draw(now);
-    if (now - this.#read < READ_EVERY_S) return;
-    this.#read = now;
-    this.#write(now);
   }
 
   #write(now: number): void {
@@ -111,7 +119,7 @@ export class Card {
   #view(name: string): HTMLElement {
     Object.assign(this.#turn, { type: "range", min: "-180", max: "180", step: "5", value: "25" });
     this.#turn.ariaLabel = `Turn the figure of ${name}, degrees`;
-    return make("div", "turn", this.#turn);
+    return make("label", "turn", "Turn", this.#turn);
   }
 
   /** Drag the figure to turn it; the slider does the same for keys. */

@@ -30,6 +30,8 @@ export type Found =
   | { readonly kind: "failed"; readonly message: string };
 
 const SEEN = 0.5; // visibility from which a point counts as tracked
+const SHOULDERS = [11, 12];
+const HIPS = [23, 24];
 
 const canvas = document.createElement("canvas");
 const plane = canvas.getContext("2d");
@@ -38,10 +40,7 @@ let taken = 0;
 
 pose.setOptions({ modelComplexity: 0, smoothLandmarks: true });
 pose.onResults(({ poseWorldLandmarks: found }) => {
-  const points = found?.map(({ x, y, z, visibility = 1 }): [number, number, number] | null =>
-    visibility < SEEN ? null : [x, y, z],
-  );
-  reply({ kind: "points", t: taken, points: points ?? null });
+  reply({ kind: "points", t: taken, points: found ? tracked(found) : null });
 });
 
 addEventListener("message", (event: MessageEvent<Picture>) => {
@@ -55,6 +54,13 @@ addEventListener("message", (event: MessageEvent<Picture>) => {
 });
 
 pose.initialize().then(() => reply({ kind: "ready" }), failed);
+
+/** Points that are seen. Who sits at a desk shows no hips: where shoulders are seen, the detector's guess will do. */
+function tracked(found: readonly Landmark[]): ([number, number, number] | null)[] {
+  const seen = (at: number) => (found[at]?.visibility ?? 1) >= SEEN;
+  const upright = SHOULDERS.every(seen);
+  return found.map(({ x, y, z }, at) => (seen(at) || (upright && HIPS.includes(at)) ? [x, y, z] : null));
+}
 
 function failed(error: unknown): void {
   reply({ kind: "failed", message: `the pose detector failed: ${error instanceof Error ? error.message : error}` });

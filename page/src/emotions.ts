@@ -5,14 +5,13 @@ import type { SeenBody } from "./messages.ts";
 
 export class Emotions {
   readonly element = make("details", "emotions", make("summary", "", "Under every emotion"));
-  readonly #rows = new Map<string, { row: HTMLElement; bar: HTMLMeterElement; number: HTMLElement }>();
+  readonly #rows = new Map<string, { row: HTMLElement; bar: HTMLElement; number: HTMLElement }>();
   readonly #list = make("ul");
 
   constructor(emotions: readonly string[], changed: () => void) {
     for (const emotion of emotions) {
-      const [bar, number] = [make("meter"), make("span", "number")];
-      bar.max = 1;
-      bar.ariaLabel = emotion;
+      const [bar, number] = [make("span", "bar"), make("span", "number")];
+      Object.assign(bar, { role: "meter", ariaLabel: emotion, ariaValueMin: "0", ariaValueMax: "1" });
       const row = make("li", "", make("span", "name", emotion), bar, number);
       this.#rows.set(emotion, { row, bar, number });
       this.#list.append(row);
@@ -30,7 +29,8 @@ export class Emotions {
     for (const [emotion, value] of Object.entries(body.by_emotion)) {
       const parts = this.#rows.get(emotion);
       if (!parts) continue;
-      parts.bar.value = value;
+      parts.bar.style.setProperty("--value", String(value));
+      parts.bar.ariaValueNow = value.toFixed(2);
       say(parts.number, value.toFixed(2));
       parts.row.toggleAttribute("data-shown", emotion === body.emotion);
     }

@@ -112,7 +112,10 @@ export class Figure {
   }
 
   #connect(from: Object3D, owner: number, offset: Point): void {
-    this.#bones[owner]?.push(this.#bone(from, offset)) ?? this.#bone(from, offset);
+    const [x, y, z] = offset;
+    // Shoulders hang on a crossbar at their height, not on the middle of the chest.
+    const bones = x !== 0 && y > 0 ? [this.#bone(from, [x, 0, 0], [0, y, z])] : [this.#bone(from, offset)];
+    this.#bones[owner]?.push(...bones);
   }
 
   #end(joint: Object3D, at: number, tip: Point): void {
@@ -128,10 +131,10 @@ export class Figure {
     this.#bones[at]?.push(head, nose);
   }
 
-  #bone(from: Object3D, to: Point): Mesh {
+  #bone(from: Object3D, to: Point, start: Point = [0, 0, 0]): Mesh {
     const along = new Vector3(...(to as [number, number, number]));
     const bone = new Mesh(new CapsuleGeometry(BONE_RADIUS_M, along.length(), 6, 14), this.#solid);
-    bone.position.copy(along).multiplyScalar(0.5);
+    bone.position.copy(along).multiplyScalar(0.5).add(new Vector3(...(start as [number, number, number])));
     bone.quaternion.setFromUnitVectors(UP, along.clone().normalize());
     from.add(bone);
     return bone;

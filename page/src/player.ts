@@ -11,7 +11,6 @@ export class Player {
   readonly #session: Session;
   readonly #body: string;
   readonly #emotion: () => string;
-  #shown: string | undefined;
   #stopped = false;
 
   constructor(recording: Recording, session: Session, body: string, emotion: () => string) {
@@ -46,18 +45,10 @@ export class Player {
     while (at < frames.length && !this.#stopped) {
       const played = performance.now() / 1000 - begin;
       for (let frame = frames[at]; frame && frame.t - first <= played; frame = frames[++at]) {
-        await this.#session.send(frame.q, { t: frame.t + shift, body: this.#body, ...this.#label() });
+        await this.#session.send(frame.q, { t: frame.t + shift, body: this.#body, emotion: this.#emotion() });
       }
       progress(Math.min(played, this.#recording.seconds));
       await new Promise((resolve) => setTimeout(resolve, LOOK_MS));
     }
-  }
-
-  /** The emotion, where it is another than before. */
-  #label(): { emotion?: string } {
-    const emotion = this.#emotion();
-    if (emotion === this.#shown) return {};
-    this.#shown = emotion;
-    return { emotion };
   }
 }

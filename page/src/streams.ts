@@ -55,7 +55,7 @@ export class Streams {
     try {
       const recording = await readRecording(file, this.#skeleton.value);
       const session = await open("c13", (news) => this.#notices.tell(news));
-      const player = new Player(recording, session, file.name.slice(0, LONGEST_NAME), () => this.#emotion.value);
+      const player = new Player(recording, session, file.name.slice(0, LONGEST_NAME), () => this.#emotion.value || "unknown");
       stop.onclick = () => player.stop();
       await player.run(this.#repeat, (seconds) => {
         bar.max = recording.seconds || 1;
@@ -94,12 +94,9 @@ export class Streams {
     try {
       session = await open("mediapipe", (news) => this.#notices.tell(news));
       const live = session;
-      let emotion = "";
       const webcam = await Webcam.open(byId<HTMLVideoElement>("camera"), (t, points) => {
         if (live.inFlight > MOST_UNDER_WAY) return; // newest wins
-        const shown = this.#emotion.value;
-        live.send(points, { t, body: "webcam", ...(shown === emotion ? {} : { emotion: shown }) }).catch(failed);
-        emotion = shown;
+        live.send(points, { t, body: "webcam", emotion: this.#emotion.value || "unknown" }).catch(failed);
         count += 1;
         say(text, `${count} poses sent`);
       }, failed);

@@ -5,6 +5,7 @@ import { colour } from "./elements.ts";
 import type { SeenBody } from "./messages.ts";
 
 const SHOWN_S = 30;
+const GAP_S = 2; // without estimates: the line breaks
 
 export class Trace {
   readonly #plot: uPlot;
@@ -22,7 +23,7 @@ export class Trace {
   /** A new estimate came, `now` in seconds. */
   add(body: SeenBody, now: number): void {
     const last = this.#times.at(-1);
-    if (last !== undefined && now - last > 1) {
+    if (last !== undefined && now - last > GAP_S) {
       this.#times.push(last + 0.01); // a gap is no line
       this.#values.push(null);
     }
@@ -52,7 +53,7 @@ export class Trace {
       height: 100,
       legend: { show: false },
       cursor: { show: false },
-      padding: [8, 8, 0, 0],
+      padding: [8, 18, 0, 0],
       scales: { x: { time: false }, y: { range: [0, 1] } },
       axes: [
         {

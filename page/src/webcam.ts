@@ -3,6 +3,8 @@
 
 import type { Found, Picture } from "./detector.ts";
 
+const LONGEST_WAIT_MS = 250; // for a new picture: browsers tell of none while the page is hidden
+
 /** Points of one instant: `t` in seconds, one [x, y, z] in metres a landmark, null where not seen. */
 export type TakePoints = (t: number, points: ([number, number, number] | null)[]) => void;
 
@@ -80,7 +82,10 @@ export class Webcam {
   };
 
   async #next(): Promise<void> {
-    await new Promise<void>((resolve) => this.#video.requestVideoFrameCallback(() => resolve()));
+    await new Promise<void>((resolve) => {
+      this.#video.requestVideoFrameCallback(() => resolve());
+      setTimeout(resolve, LONGEST_WAIT_MS);
+    });
     if (!this.#running) return;
     try {
       const picture = await createImageBitmap(this.#video);
