@@ -198,6 +198,14 @@ def test_a_file_that_is_none_is_told_in_the_services_words(service: Live, visit,
     assert seen.page.locator("#own li").count() == 0
 
 
+def test_where_there_is_no_camera_that_is_told(service: Live, visit) -> None:
+    seen = visit(service)
+    seen.page.get_by_role("button", name="Use the webcam").click()
+    seen.page.get_by_role("alert").locator(".notice").wait_for()
+    assert not seen.page.locator("#preview").is_visible()
+    assert seen.page.get_by_role("button", name="Use the webcam").is_enabled()
+
+
 # --- who may look -----------------------------------------------------------------------------------------------------
 
 
