@@ -27,6 +27,7 @@ from fervor.metadata import LevelRule, ModelMetadata, StateTensor, TrainingData
 from fervor.protocol import messages
 from fervor.protocol.codec import CODECS
 from fervor.protocol.skeleton_spec import SkeletonSpec
+from fervor.server import watch_messages
 from fervor.session.state import TRANSITIONS
 from fervor.settings import Settings
 from fervor.skeletons.catalog import SKELETONS
@@ -122,6 +123,21 @@ def test_protocol_describes_every_field(name: str) -> None:
     text = section("reference/protocol.md", f"### `{name}`" if name in MESSAGES else f"### {name}")
     if rows := rows_of(model):
         compare(table(text), rows, name)
+
+
+WATCH = {
+    "`look`": watch_messages.Look,
+    "BodyName": watch_messages.BodyName,
+    "`watch.started`": watch_messages.WatchStarted,
+    "`snapshot`": watch_messages.Snapshot,
+    "SeenSession": watch_messages.SeenSession,
+    "SeenBody": watch_messages.SeenBody,
+}
+
+
+@pytest.mark.parametrize("name", WATCH)
+def test_page_describes_every_field_of_its_line(name: str) -> None:
+    compare(table(section("reference/page.md", f"### {name}")), rows_of(WATCH[name]), name)
 
 
 def test_protocol_describes_no_message_that_is_not_there() -> None:

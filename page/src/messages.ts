@@ -24,6 +24,7 @@ export interface WatchStarted {
   readonly offsets: readonly Point[];
   readonly tips: readonly (Point | null)[];
   readonly workers: number;
+  readonly rate_hz: number;
 }
 
 export interface SeenSession {

@@ -40,7 +40,7 @@ def demo(
                 await play(session, take.frames(loop=True, seconds=seconds), screen)
 
     with interruptible(), own_service(pick_port(port)) as taken:
-        say(f"the service runs at http://{HOST}:{taken}")
+        say(f"the service runs at http://{HOST}:{taken}: open it in a browser to see who moves how")
         say(f"{take.name} streams to it in a loop, as a robot streams who stands before it")
         say(f"bar: share of observers expected to see {emotion}; mark: weak | strong")
         say("Ctrl-C stops both")

@@ -11,6 +11,8 @@ from fervor.server.service import Service
 
 log = logging.getLogger(__name__)
 
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+
 
 @asynccontextmanager
 async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -20,8 +22,11 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     await service.probe.run()
     metadata = service.model.metadata
     log.info("model %s %s (%s)", metadata.name, metadata.version, metadata.purpose)
-    if not (service.settings.checkpoint_keys or service.settings.checkpoint_keys_file):
+    settings = service.settings
+    if not (settings.checkpoint_keys or settings.checkpoint_keys_file):
         log.info("no FERVOR_CHECKPOINT_KEYS: streams survive a cut connection, but not a restart of this service")
+    if settings.page == "on" and not service.page_tokens.known and settings.host not in LOOPBACK:
+        log.info("the live page shows everybody who reaches it all bodies: see FERVOR_TOKENS and FERVOR_PAGE=off")
     watches = [
         asyncio.create_task(service.metrics.watch_loop()),
         asyncio.create_task(service.shedding.run(service.drain)),

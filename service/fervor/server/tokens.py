@@ -54,6 +54,11 @@ class Tokens:
         own = [Token.of(token.get_secret_value()) for token in settings.page_tokens]
         return cls(own) if own else clients
 
+    @property
+    def known(self) -> bool:
+        """Whether there is any, so that not everybody may in."""
+        return bool(self._fixed) or self._file is not None
+
     def holder(self, shown: Iterable[bytes]) -> str | None:
         """The name of the client that shows these tokens; None where everybody may in.
 
