@@ -62,10 +62,11 @@ function link(state: LinkState, sentence: string): void {
   byId("link").dataset.state = state;
   say(byId("link-text"), state === "refused" ? "not let in" : sentence);
   const entry = byId("entry");
-  entry.hidden = state !== "refused";
-  if (state !== "refused") return;
+  const shut = state === "refused";
+  entry.hidden = !shut;
+  document.body.classList.toggle("shut", shut);
+  if (!shut) return;
   say(byId("entry-why"), sentence);
-  byId("stream").hidden = true;
   bodies.clear();
   byId("token").focus();
 }
