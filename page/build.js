@@ -37,7 +37,10 @@ await build({
 });
 await cp(join(HERE, "static"), FRESH, { recursive: true });
 for (const file of DETECTOR) {
-  await cp(join(HERE, "node_modules/@mediapipe/pose", file), join(FRESH, "pose", file), { mode: 0 });
+  await cp(join(HERE, "node_modules/@mediapipe/pose", file), join(FRESH, "pose", file));
+}
+for (const name of ["three", "uplot"]) {
+  await cp(join(HERE, "node_modules", name, "LICENSE"), join(FRESH, "licenses", `${name}.txt`));
 }
 await rm(TARGET, { recursive: true, force: true });
 await rename(FRESH, TARGET);
