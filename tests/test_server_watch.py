@@ -136,6 +136,32 @@ async def test_what_nobody_understands_ends_the_watch_alone(start_service) -> No
     await eventually(lambda: live.service.watchers.open == 0)
 
 
+async def test_who_asks_without_end_is_cut_off(start_service) -> None:
+    live = start_service()
+    async with watch(live) as watcher:
+        with suppress(websockets.ConnectionClosed):
+            for first in range(10_000):
+                await watcher.look(first=first)
+        with suppress(websockets.ConnectionClosed):
+            while True:
+                await watcher.hear()
+    assert watcher.socket.close_code == 4429
+    await eventually(lambda: live.service.watchers.open == 0)
+
+
+async def test_a_fault_of_ours_costs_the_watcher_alone(start_service, monkeypatch) -> None:
+    live = start_service()
+    async with watch(live) as watcher, talk(live) as stream:
+        await watcher.see(lambda seen: seen["type"] == "snapshot")
+        monkeypatch.setattr("fervor.server.watch.take_snapshot", lambda *_: 1 / 0)
+        with suppress(websockets.ConnectionClosed):
+            while True:
+                await watcher.hear()
+        assert watcher.socket.close_code == 1011
+        await stream.start()
+        assert len(await stream.follow(frames_of(motion(3)))) == 3
+
+
 async def test_there_is_room_for_so_many_watchers(start_service) -> None:
     live = start_service(max_watchers=1)
     async with watch(live):
