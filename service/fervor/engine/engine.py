@@ -10,20 +10,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fervor.engine.history import NO_HISTORY, History
+from fervor.emotions import EMOTIONS
+from fervor.engine.history import NO_HISTORY
+from fervor.engine.memory import BatchMemory, States
 from fervor.engine.posing import Poses, adapt_all, between, hold, reject_jumps
 from fervor.engine.slots import Slots
 from fervor.errors import EngineError
 from fervor.model import Floats, Model
 from fervor.session.checkpoint import Memory
 from fervor.session.events import Outcome, Step, Ticket
-from fervor.session.lanes import LANES
-from fervor.skeletons.rig import UPPER_BODY
+from fervor.session.lanes import LANES, lane_plan
 
 MOST_ROWS = 256
 """Rows in one call of the model; larger batches are cut, for cache and latency."""
-
-States = dict[str, Floats]  # name → [row, *shape]
 
 
 class Engine:
@@ -40,6 +39,7 @@ class Engine:
         self.model = model
         self.slots = Slots(capacity, model.metadata)
         self._row_multiple = row_multiple
+        self._plan = lane_plan(model.metadata.rate_hz)
 
     def claim(self) -> int:
         """A free slot; raises Overloaded where none is left."""
@@ -66,68 +66,62 @@ class Engine:
         slots = self.slots
         rows = np.array([ticket.slot for ticket in tickets], np.intp)  # [ticket] slot
         fresh = np.array([ticket.fresh for ticket in tickets], np.bool_)  # [ticket]
-        posed = np.array([ticket.pose is not None for ticket in tickets], np.bool_)  # [ticket]
-        noisy = np.array([ticket.source.skeleton.noisy for ticket in tickets], np.bool_)  # [ticket]
-        slots.clear(rows[fresh])
+        if fresh.any():
+            slots.clear(rows[fresh])
         old = Poses(slots.pose[rows], slots.observed[rows])
-        came, hinges = adapt_all(tickets, slots.hinges[rows])
-        new, jumps, rejected = reject_jumps(came, old, slots.jumps[rows], noisy)
-        new = hold(new, old)
-        memory = _Memory.of(slots, rows)
-        for turn in range(max(len(ticket.steps) for ticket in tickets)):
+        came, hinges = adapt_all(tickets, slots.hinges, rows)
+        came, jumps, rejected = reject_jumps(came, old, slots.jumps[rows], _noisy(tickets))
+        new = hold(came, old)
+        turns = max(len(ticket.steps) for ticket in tickets)
+        memory = BatchMemory(slots, rows, copied=turns > 1)
+        for turn in range(turns):
             self._turn(tickets, turn, old, new, memory)
-        moved = rows[posed]
-        slots.pose[moved], slots.observed[moved] = new.rotations[posed], new.observed[posed]
-        slots.jumps[moved], slots.hinges[moved] = jumps[posed], hinges[posed]
-        slots.seen[moved] = new.observed[posed][:, UPPER_BODY].sum(axis=1)
-        memory.store(slots, rows)
-        jumped = np.where(posed, rejected.sum(axis=1), 0)
-        for row, slot in enumerate(rows.tolist()):
-            known = not np.isnan(memory.intensity[row])
-            yield Outcome(
-                float(memory.intensity[row]) if known else None,
-                memory.by_emotion[row],
-                int(slots.seen[slot]),
-                int(jumped[row]),
-                slots.recall(slot) if tickets[row].checkpoint is not None else None,
-            )
+        memory.store()
+        posed = np.array([ticket.pose is not None for ticket in tickets], np.bool_)  # [ticket]
+        slots.move(rows, posed, new=new, jumps=jumps, hinges=hinges)
+        return _outcomes(tickets, slots, rows, memory, np.where(posed, rejected, 0))
 
-    def _turn(self, tickets: Sequence[Ticket], number: int, old: Poses, new: Poses, memory: "_Memory") -> None:
+    def _turn(self, tickets: Sequence[Ticket], number: int, old: Poses, new: Poses, memory: BatchMemory) -> None:
         """One grid step of every ticket that has a step `number`."""
         live = [row for row, ticket in enumerate(tickets) if len(ticket.steps) > number]
         steps = [tickets[row].steps[number] for row in live]
         index = np.array(live, np.intp)
+        if len(live) < len(tickets):
+            old, new = old.rows(index), new.rows(index)
         rotations, mask = between(
-            Poses(old.rotations[index], old.observed[index]),
-            Poses(new.rotations[index], new.observed[index]),
+            old,
+            new,
             np.array([step.fraction for step in steps]),
             np.array([step.held for step in steps]),
         )
-        emotion = np.stack([step.label.vector for step in steps])  # [step, emotion]
+        labels = b"".join([step.label.vector.tobytes() for step in steps])  # sooner done than np.stack
+        emotion = np.frombuffer(labels, np.float32).reshape(len(steps), len(EMOTIONS))  # [step, emotion]
         taken = _Turn(index, steps, rotations, mask, emotion)
         self._run_lanes(taken, memory)
         self._run_windows(taken, memory)
 
-    def _run_lanes(self, turn: "_Turn", memory: "_Memory") -> None:
-        """The steps of bodies with recurrent states."""
-        lanes = _LaneRows.of(turn.steps)
-        if not len(lanes.step):
+    def _run_lanes(self, turn: "_Turn", memory: BatchMemory) -> None:
+        """The steps of bodies with recurrent states: a row of the model for every lane that runs."""
+        place = np.array([step.lanes for step in turn.steps], np.intp)
+        runs = self._plan.runs[place]  # [step, lane]
+        step, lane = np.nonzero(runs)  # [row]
+        if not len(step):
             return
-        at = (turn.index[lanes.step], lanes.lane)
-        states = {name: state[at] for name, state in memory.states.items()}
-        for state in states.values():
-            state[lanes.restart] = 0.0
-        intensity, by_emotion, states = self._call(
-            turn.rotations[lanes.step], turn.mask[lanes.step], turn.emotion[lanes.step], states
-        )
-        for name, state in states.items():
-            memory.states[name][at] = state
-        stateful = np.array([bool(step.schedule) for step in turn.steps])
-        rows = turn.index[stateful]
-        memory.intensity[rows] = lanes.blend(intensity[:, None], len(turn.steps))[stateful, 0]
-        memory.by_emotion[rows] = lanes.blend(by_emotion, len(turn.steps))[stateful]
+        tickets = turn.index[step]
+        states = memory.lanes(tickets, lane)
+        restart = np.flatnonzero(self._plan.restart[place][runs])
+        if len(restart):
+            for state in states.values():
+                state[restart] = 0.0
+        outputs = self._call(turn.rotations[step], turn.mask[step], turn.emotion[step], states)
+        intensity, by_emotion, states = outputs
+        memory.move(tickets, lane, states)
+        stateful = runs.any(axis=1)
+        rows, weight = turn.index[stateful], self._plan.weight[place]  # weight: [step, lane]
+        memory.intensity[rows] = _blend(intensity[:, None], runs, weight)[stateful, 0]
+        memory.by_emotion[rows] = _blend(by_emotion, runs, weight)[stateful]
 
-    def _run_windows(self, turn: "_Turn", memory: "_Memory") -> None:
+    def _run_windows(self, turn: "_Turn", memory: BatchMemory) -> None:
         """The steps of bodies with a window, those of one length together."""
         by_length: dict[int, list[int]] = {}
         for number, step in enumerate(turn.steps):
@@ -156,25 +150,34 @@ class Engine:
         states: States,
     ) -> tuple[Floats, Floats, States]:
         """One step of the model, cut into calls: intensity [row], by emotion [row, 11], next states."""
-        parts = []
-        for first in range(0, len(rotations), MOST_ROWS):
-            cut = slice(first, first + MOST_ROWS)
-            count = len(rotations[cut])
-            spare = -count % self._row_multiple
-            outputs = self.model.run(
-                _pad(rotations[cut], spare)[:, None],
-                _pad(mask[cut], spare)[:, None],
-                _pad(emotion[cut], spare)[:, None],
-                {name: _pad(state[cut], spare) for name, state in states.items()},
-            )
-            parts.append(
-                (_finite(outputs.intensity[:count, 0]), outputs.intensity_by_emotion[:count, 0], outputs.states, count)
-            )
+        parts = [
+            self._call_once(*(array[first : first + MOST_ROWS] for array in (rotations, mask, emotion)), {
+                name: state[first : first + MOST_ROWS] for name, state in states.items()
+            })
+            for first in range(0, len(rotations), MOST_ROWS)
+        ]
+        if len(parts) == 1:
+            return parts[0]
         return (
-            np.concatenate([part[0] for part in parts]),
-            np.concatenate([part[1] for part in parts]),
-            {name: np.concatenate([part[2][name][: part[3]] for part in parts]) for name in states},
+            np.concatenate([intensity for intensity, _, _ in parts]),
+            np.concatenate([by_emotion for _, by_emotion, _ in parts]),
+            {name: np.concatenate([after[name] for _, _, after in parts]) for name in states},
         )
+
+    def _call_once(
+        self, rotations: Floats, mask: Floats, emotion: Floats, states: States
+    ) -> tuple[Floats, Floats, States]:
+        """As `_call`, of no more rows than the model is given at once."""
+        count = len(rotations)
+        spare = -count % self._row_multiple
+        outputs = self.model.run(
+            _pad(rotations, spare)[:, None],
+            _pad(mask, spare)[:, None],
+            _pad(emotion, spare)[:, None],
+            {name: _pad(state, spare) for name, state in states.items()},
+        )
+        after = {name: state[:count] for name, state in outputs.states.items()}
+        return _finite(outputs.intensity[:count, 0]), outputs.intensity_by_emotion[:count, 0], after
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,56 +191,36 @@ class _Turn:
     emotion: Floats  # [step, emotion]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Memory:
-    """Working copies of the batch's slots, stored only when the whole batch succeeded."""
-
-    states: States  # name → [ticket, lane, *shape]
-    histories: dict[int, History]  # ticket → last poses, windows only
-    intensity: npt.NDArray[np.float64]  # [ticket]
-    by_emotion: npt.NDArray[np.float64]  # [ticket, emotion]
-
-    @classmethod
-    def of(cls, slots: Slots, rows: npt.NDArray[np.intp]) -> "_Memory":
-        states = {name: state[rows] for name, state in slots.states.items()}
-        places = enumerate(rows.tolist())
-        histories = {at: slots.histories[slot] for at, slot in places if slot in slots.histories}
-        return cls(states, histories, slots.intensity[rows], slots.by_emotion[rows])
-
-    def store(self, slots: Slots, rows: npt.NDArray[np.intp]) -> None:
-        for name, state in self.states.items():
-            slots.states[name][rows] = state
-        for at, history in self.histories.items():
-            slots.histories[int(rows[at])] = history
-        slots.intensity[rows], slots.by_emotion[rows] = self.intensity, self.by_emotion
+def _blend(values: Floats, runs: npt.NDArray[np.bool_], weight: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Values [row, k] of the lanes that run [step, lane], weighted [step, lane] into one a step: [step, k]."""
+    spread = np.zeros((*runs.shape, values.shape[1]), np.float32)
+    spread[runs] = values
+    blended = weight[:, 0, None] * spread[:, 0]
+    for lane in range(1, LANES):
+        blended += weight[:, lane, None] * spread[:, lane]
+    return blended
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _LaneRows:
-    """The rows of one model call: every lane that runs in every step."""
+def _noisy(tickets: Sequence[Ticket]) -> npt.NDArray[np.bool_]:
+    """Whose poses can flip: [ticket]."""
+    return np.array([ticket.source.skeleton.noisy for ticket in tickets], np.bool_)
 
-    step: npt.NDArray[np.intp]  # [row] which step
-    lane: npt.NDArray[np.intp]  # [row]
-    restart: npt.NDArray[np.bool_]  # [row]
-    weight: npt.NDArray[np.float64]  # [row]
 
-    @classmethod
-    def of(cls, steps: Sequence[Step]) -> "_LaneRows":
-        rows = [(number, lane) for number, step in enumerate(steps) for lane in step.schedule]
-        return cls(
-            np.array([number for number, _ in rows], np.intp),
-            np.array([lane.lane for _, lane in rows], np.intp),
-            np.array([lane.restart for _, lane in rows], np.bool_),
-            np.array([lane.weight for _, lane in rows], np.float64),
-        )
-
-    def blend(self, values: Floats, steps: int) -> npt.NDArray[np.float64]:
-        """Values [row, k] of the lanes, weighted into one a step: [step, k]."""
-        blended = np.zeros((steps, values.shape[1]))
-        for lane in range(LANES):  # a step has each lane once, so no two rows meet in one sum
-            mine = self.lane == lane
-            blended[self.step[mine]] += self.weight[mine, None] * values[mine]
-        return blended
+def _outcomes(
+    tickets: Sequence[Ticket],
+    slots: Slots,
+    rows: npt.NDArray[np.intp],
+    memory: BatchMemory,
+    jumped: npt.NDArray[np.int64],
+) -> Iterator[Outcome]:
+    """What became of each ticket, from arrays by ticket."""
+    columns = zip(
+        tickets, rows.tolist(), memory.intensity.tolist(), slots.seen[rows].tolist(), jumped.tolist(), strict=True
+    )
+    for at, (ticket, slot, intensity, seen, jumps) in enumerate(columns):
+        known = intensity == intensity  # nan: no step yet
+        recalled = None if ticket.checkpoint is None else slots.recall(slot)
+        yield Outcome(intensity if known else None, memory.by_emotion[at], seen, jumps, recalled)
 
 
 def _finite(intensity: Floats) -> Floats:

@@ -10,13 +10,14 @@ import numpy.typing as npt
 
 from fervor.emotions import EMOTIONS
 from fervor.engine.history import History
+from fervor.engine.posing import Poses
 from fervor.errors import CheckpointMismatch, Overloaded
 from fervor.metadata import ModelMetadata
 from fervor.rotations import IDENTITY
 from fervor.session.checkpoint import Memory
 from fervor.session.lanes import LANES
 from fervor.skeletons.positions import no_hinges
-from fervor.skeletons.rig import JOINTS
+from fervor.skeletons.rig import JOINTS, UPPER_BODY
 
 
 class Slots:
@@ -64,6 +65,24 @@ class Slots:
         for slot in slots.tolist():
             self.histories.pop(slot, None)
         self.intensity[slots], self.by_emotion[slots], self.seen[slots] = np.nan, 0.0, 0
+
+    def move(
+        self,
+        slots: npt.NDArray[np.intp],
+        posed: npt.NDArray[np.bool_],
+        *,
+        new: Poses,
+        jumps: npt.NDArray[np.int64],
+        hinges: npt.NDArray[np.float64] | None,
+    ) -> None:
+        """Take the newest poses of those slots [row] that have one (`posed` [row]); hinges None: no sensor has any."""
+        if not posed.all():
+            slots, new, jumps = slots[posed], new.rows(posed), jumps[posed]
+            hinges = None if hinges is None else hinges[posed]
+        self.pose[slots], self.observed[slots], self.jumps[slots] = new.rotations, new.observed, jumps
+        self.seen[slots] = np.count_nonzero(new.observed[:, UPPER_BODY], axis=1)
+        if hinges is not None:
+            self.hinges[slots] = hinges
 
     def recall(self, slot: int) -> Memory:
         """Copies of all that a slot holds."""

@@ -18,7 +18,7 @@ from fervor.session.answers import Answers, Arrays
 from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
 from fervor.session.label import NO_LABEL, Label, make_label
-from fervor.session.lanes import schedule, window_steps
+from fervor.session.lanes import plan_row, window_steps
 from fervor.session.timeline import Advance, Instant, Timeline, advance, count_frame
 from fervor.skeletons.rig import UPPER_BODY
 
@@ -251,7 +251,7 @@ class Body:
         return Step(
             fraction=instant.fraction,
             held=instant.held,
-            schedule=schedule(memory, instant.index, rate),
+            lanes=plan_row(memory, instant.index, rate),
             window=window_steps(memory, rate),
             label=self._label.at(instant.time),
         )

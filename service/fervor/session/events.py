@@ -12,7 +12,6 @@ from fervor.errors import CloseCode
 from fervor.protocol.messages import Flag, ServerMessage
 from fervor.session.checkpoint import Bookkeeping, Memory
 from fervor.session.label import Label
-from fervor.session.lanes import Schedule
 from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.skeleton import Axes, Skeleton
 
@@ -71,9 +70,10 @@ class Step:
     """Where between the body's pose before (0) and this ticket's (1)."""
     held: bool
     """The pose before stays, unobserved."""
-    schedule: Schedule
-    """The lanes that run; empty where `window` says how many poses to run from zero instead."""
+    lanes: int
+    """Row of the lane plan: which lanes run."""
     window: int
+    """Poses to run from zero, where no lane does; else 0."""
     label: Label
 
 

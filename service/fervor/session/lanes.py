@@ -6,8 +6,12 @@ ends where it restarts. `stateful` is the paper's: one lane, never restarted. `w
 runs the last `WINDOW_S` of poses from zero.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+
+import numpy as np
+import numpy.typing as npt
 
 from fervor.protocol.messages import Memory
 
@@ -45,6 +49,39 @@ def schedule(memory: Memory, index: int, rate_hz: float) -> Schedule:
     return opening[index] if index < len(opening) else cycle[index % len(cycle)]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class LanePlan:
+    """All schedules of one rate as arrays, so that steps of many bodies are laid out together: a row a schedule."""
+
+    runs: npt.NDArray[np.bool_]  # [row, lane]
+    restart: npt.NDArray[np.bool_]  # [row, lane]
+    weight: npt.NDArray[np.float64]  # [row, lane], zero where a lane does not run
+
+
+def plan_row(memory: Memory, index: int, rate_hz: float) -> int:
+    """Where `schedule` of the same step stands in the `lane_plan` of that rate."""
+    if memory == "window":
+        return 0
+    if memory == "stateful":
+        return 1 if index == 0 else 2
+    opening = 2 * _half(rate_hz)  # steps of the first period; so many rows stand for every later one
+    return 3 + index if index < opening else 3 + opening + index % opening
+
+
+@cache
+def lane_plan(rate_hz: float) -> LanePlan:
+    """The schedules of a rate in the order of `plan_row`."""
+    opening, cycle = _staggered(rate_hz)
+    alike = ((), schedule("stateful", 0, rate_hz), _ALONE)
+    rows: Sequence[Schedule] = (*alike, *opening, *cycle)
+    runs, restart = (np.zeros((len(rows), LANES), np.bool_) for _ in range(2))
+    weight = np.zeros((len(rows), LANES))
+    for row, lanes in enumerate(rows):
+        for step in lanes:
+            runs[row, step.lane], restart[row, step.lane], weight[row, step.lane] = True, step.restart, step.weight
+    return LanePlan(runs, restart, weight)
+
+
 def window_steps(memory: Memory, rate_hz: float) -> int:
     """Steps in the window; 0 for memories that have a state instead."""
     return max(round(WINDOW_S * rate_hz), 1) if memory == "window" else 0
@@ -53,11 +90,17 @@ def window_steps(memory: Memory, rate_hz: float) -> int:
 @cache
 def _staggered(rate_hz: float) -> tuple[tuple[Schedule, ...], tuple[Schedule, ...]]:
     """The first period, in which lane 1 is still to come, and every later one."""
-    half = max(round(PERIOD_S * rate_hz / 2), 1)  # steps
+    half = _half(rate_hz)
     fade = min(round(FADE_S * rate_hz), half - 1)
     opening: list[Schedule] = [(LaneStep(0, restart=index == 0, weight=1.0),) for index in range(half)]
     opening += [_pair(index, half, fade) for index in range(half, 2 * half)]
     return tuple(opening), tuple(_pair(index, half, fade) for index in range(2 * half))
+
+
+@cache
+def _half(rate_hz: float) -> int:
+    """Half a period, steps."""
+    return max(round(PERIOD_S * rate_hz / 2), 1)
 
 
 def _pair(index: int, half: int, fade: int) -> Schedule:
