@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from bodies import motion, terms
 from fervor.engine.posing import JUMPS_BELIEVED, Poses, adapt_all, between, hold, reject_jumps
+from fervor.rotations import slerp
 from fervor.session.body import Body
 from fervor.session.events import Pose
 from fervor.skeletons.positions import no_hinges
@@ -94,8 +95,26 @@ def test_adapting_a_mixed_batch_gives_each_row_what_it_gets_alone(count):
         rotations = motion(1, seed=row, joints=joints)[0]
         body = Body(str(row), row, agreed)
         tickets.append(body.plan(0, 0.0, Pose(rotations, np.arange(joints) != row % joints)))
-    together, _ = adapt_all(tickets, no_hinges((count,)))
+    together, _ = adapt_all(tickets, no_hinges((count,)), np.arange(count))
     for row, ticket in enumerate(tickets):
-        alone, _ = adapt_all([ticket], no_hinges((1,)))
+        alone, _ = adapt_all([ticket], no_hinges((1,)), np.arange(1))
         assert np.array_equal(together.rotations[row], alone.rotations[0])
         assert np.array_equal(together.observed[row], alone.observed[0])
+
+
+@pytest.mark.parametrize("arrived", [np.ones(6, np.bool_), np.arange(6) % 2 == 0, np.zeros(6, np.bool_)])
+@pytest.mark.parametrize("held", [np.zeros(6, np.bool_), np.arange(6) % 3 == 0])
+def test_a_batch_on_its_way_gives_each_row_what_it_gets_alone(arrived, held):
+    """What is left out where all have arrived changes no bit."""
+    random = np.random.default_rng(3)
+    old, new = (Poses(motion(6, seed=seed), random.random((6, 13)) < 0.8) for seed in (1, 2))
+    fraction = np.where(arrived, 1.0, random.random(6))
+    rotations, mask = between(old, new, fraction, held)
+    for row in range(6):
+        one = slice(row, row + 1)
+        a, b = (Poses(each.rotations[one], each.observed[one]) for each in (old, new))
+        turned = slerp(a.rotations, b.rotations, np.full((1, 13), fraction[row]))  # the plain way: turn all, then choose
+        expected = np.where(held[row], a.rotations, np.where(arrived[row], b.rotations, turned)).astype(np.float32)
+        seen = np.where(arrived[row], b.observed, a.observed & b.observed) & ~held[row]
+        assert np.array_equal(rotations[one], expected)
+        assert np.array_equal(mask[one], seen.astype(np.float32))

@@ -38,27 +38,26 @@ def lives(draw):
 
 
 @given(lives())
-def test_what_is_kept_survives_the_way_through_arrays_to_the_bit(told):
-    answers = Answers()
+def test_what_is_kept_survives_the_way_through_bytes_to_the_bit(told):
+    answers = Answers("eve")
     for estimate in told:
         answers.expect(estimate.seq)
-        answers.give(estimate.seq, estimate)
-    again = Answers.from_arrays("eve", answers.to_arrays())
+        answers.give(estimate)
+    again = Answers.from_bytes("eve", answers.to_bytes())
     for place, estimate in enumerate(told):
         kept = estimate if place >= len(told) - REMEMBERED else None
         assert answers.find(estimate.seq) == again.find(estimate.seq) == kept
-    if len(told) < REMEMBERED:
-        assert all(array.nbytes <= 8 * REMEMBERED * len(EMOTIONS) for array in again.to_arrays().values())
+    assert len(again.to_bytes()) == min(len(told), REMEMBERED)
 
 
 @given(st.lists(st.integers(0, 90), max_size=300), st.randoms(use_true_random=False))
 def test_what_is_remembered_does_not_depend_on_how_far_the_engine_has_come(seqs, dice):
     """Answered at once or late, in one order: the same frames are known, forgotten, and shared."""
-    prompt, slow = Answers(), Answers()
+    prompt, slow = Answers("eve"), Answers("eve")
     under_way: list[int] = []
 
     def conclude(answers, seq):
-        answers.give(seq, Estimate(body="e", seq=seq, t=0, intensity=None, level=None, emotion="joy", status="ok"))
+        answers.give(Estimate(body="e", seq=seq, t=0, intensity=None, level=None, emotion="joy", status="ok"))
 
     for seq in seqs:
         known = prompt.find(seq) is not None
@@ -77,14 +76,13 @@ def test_what_is_remembered_does_not_depend_on_how_far_the_engine_has_come(seqs,
 
 
 def test_a_failed_frame_may_come_again():
-    answers = Answers()
+    answers = Answers("eve")
     assert [answers.expect(7), answers.expect(7)] == [False, True]
     answers.fail(7)
     assert answers.expect(7) is False
 
 
-def test_arrays_of_something_else_are_refused():
-    arrays = Answers().to_arrays()
-    del arrays["seq"]
+@given(st.binary(max_size=60))
+def test_bytes_of_something_else_are_refused(data):
     with pytest.raises(CheckpointUnknown):
-        Answers.from_arrays("eve", arrays)
+        Answers.from_bytes("eve", [data])

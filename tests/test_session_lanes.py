@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from fervor.session.lanes import FADE_S, PERIOD_S, schedule
+from fervor.session.lanes import FADE_S, LANES, PERIOD_S, lane_plan, plan_row, schedule
 
 RATE = 30.0
 
@@ -49,3 +49,16 @@ def test_cross_fade_takes_half_a_second_in_equal_steps():
 def test_first_four_seconds_run_one_lane_only():
     assert all(len(schedule("staggered", index, RATE)) == 1 for index in range(120))
     assert len(schedule("staggered", 120, RATE)) == 2
+
+
+@pytest.mark.parametrize("memory", ["staggered", "stateful", "window"])
+@pytest.mark.parametrize("rate", [1.0, 25.0, 30.0])
+def test_the_plan_says_of_every_step_what_its_schedule_says(memory, rate):
+    plan = lane_plan(rate)
+    for index in [*range(round(3 * PERIOD_S * rate)), 100_000]:
+        row = plan_row(memory, index, rate)
+        lanes = {step.lane: step for step in schedule(memory, index, rate)}
+        for lane in range(LANES):
+            step = lanes.get(lane)
+            planned = (plan.runs[row, lane], plan.restart[row, lane], plan.weight[row, lane])
+            assert planned == ((False, False, 0.0) if step is None else (True, step.restart, step.weight))

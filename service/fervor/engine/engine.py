@@ -79,7 +79,7 @@ class Engine:
         memory.store()
         posed = np.array([ticket.pose is not None for ticket in tickets], np.bool_)  # [ticket]
         slots.move(rows, posed, new=new, jumps=jumps, hinges=hinges)
-        return _outcomes(tickets, slots, rows, memory, np.where(posed, rejected, 0))
+        return _outcomes(tickets, slots, rows, memory, np.where(posed, np.count_nonzero(rejected, axis=1), 0))
 
     def _turn(self, tickets: Sequence[Ticket], number: int, old: Poses, new: Poses, memory: BatchMemory) -> None:
         """One grid step of every ticket that has a step `number`."""

@@ -83,7 +83,7 @@ def _stacked(
 
 def reject_jumps(
     new: Poses, old: Poses, jumps: npt.NDArray[np.int64], noisy: npt.NDArray[np.bool_]
-) -> tuple[Poses, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+) -> tuple[Poses, npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
     """Take joints that flipped as untracked.
 
     Args:
@@ -93,15 +93,15 @@ def reject_jumps(
         noisy: [row] whether the source flips at all.
 
     Returns:
-        the poses with flipped joints unobserved, the new counts, and how many joints of each [row] were rejected.
+        the poses with flipped joints unobserved, the new counts, and which joints [row, joint] were rejected.
     """
     if not noisy.any():
-        return new, np.where(new.observed, 0, jumps), np.zeros(len(jumps), np.int64)
+        return new, np.where(new.observed, 0, jumps), np.zeros(jumps.shape, np.bool_)
     comparable = new.observed & old.observed | new.observed & (jumps > 0)
     far = noisy[:, None] & comparable & (angle_between(old.rotations, new.rotations) > JUMP_RAD)
     rejected = far & (jumps + 1 < JUMPS_BELIEVED)
     counts = np.where(rejected, jumps + 1, np.where(new.observed, 0, jumps))
-    return Poses(new.rotations, new.observed & ~rejected), counts, rejected.sum(axis=1)
+    return Poses(new.rotations, new.observed & ~rejected), counts, rejected
 
 
 def hold(new: Poses, old: Poses) -> Poses:

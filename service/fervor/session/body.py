@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from fervor.emotions import EMOTIONS, UNKNOWN
@@ -14,7 +15,7 @@ from fervor.levels import LevelState, next_level
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
 from fervor.protocol.trusted import trusted
-from fervor.session.answers import Answers, Arrays
+from fervor.session.answers import Answers
 from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
 from fervor.session.label import NO_LABEL, Label, make_label
@@ -58,7 +59,7 @@ class Body:
         self._emotion = UNKNOWN
         self._pending: tuple[Flag, ...] = ()
         self._next_checkpoint = -math.inf  # seconds
-        self._answers = Answers()
+        self._answers = Answers(name)
         self._enough = _enough(terms)
 
     @property
@@ -161,11 +162,11 @@ class Body:
         if ticket.checkpoint is None:
             raise ValueError(f"no checkpoint was due with frame {ticket.seq}")
         level = None if self._level is None else (self._level.level, self._level.since)
-        return ticket.checkpoint.model_copy(update={"level": level, "emotion": self._emotion})
+        return msgspec.structs.replace(ticket.checkpoint, level=level, emotion=self._emotion)
 
-    def answers(self) -> Arrays:
+    def answers(self) -> tuple[bytes, ...]:
         """What it was answered so far, for a checkpoint."""
-        return self._answers.to_arrays()
+        return self._answers.to_bytes()
 
     @classmethod
     def restore(cls, kept: Bookkeeping, answers: Answers, slot: int, terms: Terms) -> "Body":
@@ -227,7 +228,7 @@ class Body:
             "by_emotion": self._by_emotion(outcome),
         }
         estimate = trusted(Estimate, fields)
-        self._answers.give(ticket.seq, estimate)
+        self._answers.give(estimate)
         return estimate
 
     def fail(self, ticket: Ticket) -> None:

@@ -1,9 +1,9 @@
 """A checkpoint: all that is needed to go on with a body as if nothing had happened, as bytes.
 
-Bookkeeping as JSON (Python's floats survive it to the bit), then arrays raw, little-endian: the engine's, and the
-answers to the newest frames. All of it deflated, which halves it. Bound to the model file, the protocol and the terms
-of the session: a state makes no sense under others. Who may make and read one is not decided here; see
-`fervor.session.sealing`.
+MessagePack, whose floats are float64 as Python's: bookkeeping, the answers to the newest frames, and the engine's arrays
+raw, little-endian. Long ones are deflated; those of a usual session are not, for that would cost a tenth of what a
+second's frames do. Bound to the model file, the protocol and the terms of the session: a state makes no sense under
+others. Who may make and read one is not decided here; see `fervor.session.sealing`.
 """
 
 import hashlib
@@ -11,32 +11,32 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+import numpy.typing as npt
 
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
 from fervor.levels import Level
 from fervor.protocol.messages import PROTOCOL, Flag
-from fervor.session.answers import Answers, Arrays
+from fervor.session.answers import Answers
 
-FORMAT = 2
+FORMAT = 3
 """Version of these bytes."""
 
-_ANSWER = "answer."
-"""Prefix of the names of arrays that are a body's own, not the engine's."""
+MOST_PLAIN = 8192
+"""Bytes above which a checkpoint is deflated: with a window, or intensities under every emotion."""
+
+Arrays = Mapping[str, npt.NDArray[np.generic]]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Memory:
+class Memory(msgspec.Struct, frozen=True, eq=False, gc=False):
     """What the engine holds of one body: arrays by name, copied."""
 
     arrays: Arrays
 
 
-class Bookkeeping(BaseModel):
+class Bookkeeping(msgspec.Struct, frozen=True, array_like=True, gc=False):
     """What a body holds of itself, right after its frame `newest_seq`."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     newest_seq: int
@@ -48,14 +48,28 @@ class Bookkeeping(BaseModel):
     emotion: str
 
 
-class _Head(BaseModel):
+class _Array(msgspec.Struct, frozen=True, array_like=True, gc=False):
+    dtype: str
+    shape: tuple[int, ...]
+    content: bytes
+
+
+class _Content(msgspec.Struct, frozen=True, array_like=True, gc=False):
     format: int
     protocol: str
     model: str
     fingerprint: str
     terms: str
     body: Bookkeeping
-    arrays: tuple[tuple[str, str, tuple[int, ...]], ...]  # name, dtype, shape
+    answers: tuple[bytes, ...]
+    memory: dict[str, _Array]
+
+
+_PLAIN = bytes([0x90 | len(_Content.__struct_fields__)])
+"""How a content begins that is not deflated: as a MessagePack array of so many entries."""
+
+_encode = msgspec.msgpack.Encoder().encode
+_decode = msgspec.msgpack.Decoder(_Content).decode
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,22 +93,12 @@ class Opened:
     same_runtime: bool
 
 
-def pack(bond: Bond, body: Bookkeeping, answers: Arrays, memory: Memory) -> bytes:
+def pack(bond: Bond, body: Bookkeeping, answers: tuple[bytes, ...], memory: Memory) -> bytes:
     """The bytes of a checkpoint."""
-    own = {f"{_ANSWER}{name}": array for name, array in answers.items()}
-    arrays = {name: np.asarray(array, order="C") for name, array in (own | memory.arrays).items()}
-    head = _Head(
-        format=FORMAT,
-        protocol=PROTOCOL,
-        model=bond.model,
-        fingerprint=bond.fingerprint,
-        terms=bond.terms,
-        body=body,
-        arrays=tuple((name, array.dtype.newbyteorder("<").str, array.shape) for name, array in arrays.items()),
-    ).model_dump_json()
-    parts = [array.astype(array.dtype.newbyteorder("<"), copy=False).tobytes() for array in arrays.values()]
-    encoded = head.encode()
-    return zlib.compress(b"".join([len(encoded).to_bytes(4, "little"), encoded, *parts]), level=1)
+    arrays = {name: _flattened(array) for name, array in memory.arrays.items()}
+    content = _Content(FORMAT, PROTOCOL, bond.model, bond.fingerprint, bond.terms, body, answers, arrays)
+    plain = _encode(content)
+    return plain if len(plain) <= MOST_PLAIN else zlib.compress(plain, level=1)
 
 
 def unpack(data: bytes, bond: Bond) -> Opened:
@@ -105,23 +109,20 @@ def unpack(data: bytes, bond: Bond) -> Opened:
         CheckpointMismatch: another model file, or another session's terms.
     """
     try:
-        inflated = zlib.decompress(data)
-        size = int.from_bytes(inflated[:4], "little")
-        head = _Head.model_validate_json(inflated[4 : 4 + size])
-        arrays = _arrays(inflated[4 + size :], head.arrays)
-    except (zlib.error, ValidationError, ValueError, TypeError):
+        content = _decode(data if data.startswith(_PLAIN) else zlib.decompress(data))
+        arrays = {name: _restored(array) for name, array in content.memory.items()}
+    except (zlib.error, msgspec.DecodeError, ValueError, TypeError):
         raise CheckpointUnknown("the checkpoint can't be read; expected a token as the service sent it") from None
-    if (head.format, head.protocol) != (FORMAT, PROTOCOL):
-        raise CheckpointUnknown(f"the checkpoint is of {head.protocol} format {head.format}; expected {PROTOCOL}")
-    if head.model != bond.model:
+    if (content.format, content.protocol) != (FORMAT, PROTOCOL):
+        raise CheckpointUnknown(f"the checkpoint is of {content.protocol} format {content.format}; expected {PROTOCOL}")
+    if content.model != bond.model:
         raise CheckpointMismatch("the checkpoint is of another model file; start the body anew")
-    if head.terms != bond.terms:
+    if content.terms != bond.terms:
         raise CheckpointMismatch(
             "the checkpoint is of a session with other terms; send the same session.start, with resume added"
         )
-    own = {name.removeprefix(_ANSWER): array for name, array in arrays.items() if name.startswith(_ANSWER)}
-    memory = Memory({name: array for name, array in arrays.items() if not name.startswith(_ANSWER)})
-    return Opened(head.body, Answers.from_arrays(head.body.name, own), memory, head.fingerprint == bond.fingerprint)
+    answers = Answers.from_bytes(content.body.name, content.answers)
+    return Opened(content.body, answers, Memory(arrays), content.fingerprint == bond.fingerprint)
 
 
 def digest(parts: Mapping[str, object]) -> str:
@@ -129,15 +130,12 @@ def digest(parts: Mapping[str, object]) -> str:
     return hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
 
 
-def _arrays(data: bytes, table: tuple[tuple[str, str, tuple[int, ...]], ...]) -> Arrays:
-    arrays: Arrays = {}
-    start = 0
-    for name, dtype, shape in table:
-        count = int(np.prod(shape, dtype=np.int64))
-        end = start + count * np.dtype(dtype).itemsize
-        array = np.frombuffer(data[start:end], dtype).reshape(shape)
-        arrays[name] = array.astype(array.dtype.newbyteorder("="))
-        start = end
-    if start != len(data):
-        raise ValueError("bytes are left over")
-    return arrays
+def _flattened(array: npt.NDArray[np.generic]) -> _Array:
+    if array.dtype.byteorder not in "<|=" or not np.little_endian:
+        array = array.astype(array.dtype.newbyteorder("<"))
+    return _Array(array.dtype.str, array.shape, array.tobytes())
+
+
+def _restored(array: _Array) -> npt.NDArray[np.generic]:
+    dtype = np.dtype(array.dtype)
+    return np.frombuffer(array.content, dtype).reshape(array.shape).astype(dtype.newbyteorder("="))

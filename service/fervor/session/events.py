@@ -1,10 +1,14 @@
 """What a session asks its edge to do, and what the engine tells it back. Values only.
 
 Data flows one way: message → session → `Ticket` → engine → `Outcome` → session → `Reply`.
+
+What is made for every frame is a msgspec structure: made in C, at a fifth of a dataclass's cost, and nothing that the
+garbage collector has to walk.
 """
 
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -16,8 +20,7 @@ from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.skeleton import Axes, Skeleton
 
 
-@dataclass(frozen=True, slots=True)
-class Reply:
+class Reply(msgspec.Struct, frozen=True, gc=False):
     """Send this message, after all earlier ones."""
 
     message: ServerMessage
@@ -62,8 +65,7 @@ class Pose:
     observed: npt.NDArray[np.bool_]  # [joint]
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(msgspec.Struct, frozen=True, gc=False):
     """One model evaluation of a body."""
 
     fraction: float
@@ -77,8 +79,7 @@ class Step:
     label: Label
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ticket:
+class Ticket(msgspec.Struct, frozen=True, eq=False, gc=False):
     """The work that one frame brings; answered by one `Outcome`."""
 
     slot: int
@@ -101,8 +102,7 @@ class Ticket:
     """What the body held right after this ticket was planned, where a checkpoint is due."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class Outcome(msgspec.Struct, frozen=True, eq=False, gc=False):
     """What the engine made of a ticket."""
 
     intensity: float | None

@@ -11,6 +11,7 @@ import hmac
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from fervor.errors import CheckpointUnknown
 
@@ -55,9 +56,10 @@ class Sealer:
         return signed[_HEAD.size :]
 
 
+@lru_cache(maxsize=8)
 def _key_id(key: bytes) -> bytes:
     return hashlib.sha256(b"fervor key id" + key).digest()[:4]
 
 
 def _mac(key: bytes, signed: bytes) -> bytes:
-    return hmac.new(key, signed, hashlib.sha256).digest()
+    return hmac.digest(key, signed, "sha256")

@@ -51,6 +51,7 @@ class Session:
         self.state = SessionState.NEW
         self._host = host
         self._agreement: Agreement | None = None
+        self._bond: Bond | None = None  # of checkpoints, to that agreement; once one is needed
         self._roster = Roster(host.claim, most=host.limits.max_bodies, idle_s=host.limits.body_idle_s)
         self._tickets: dict[Ticket, tuple[Body, int]] = {}  # under way → its body, its place in the group
         self._outcomes: dict[Ticket, Outcome | EngineError] = {}  # that wait for those of earlier tickets
@@ -183,7 +184,7 @@ class Session:
         """
         if tokens and self._host.unseal is None:
             raise CheckpointUnknown("this service gives and takes no checkpoints; start without resume")
-        opened = [unpack(self._host.unseal(token), self._bond) for token in tokens if self._host.unseal]
+        opened = [unpack(self._host.unseal(token), self._bound()) for token in tokens if self._host.unseal]
         if len({kept.body.name for kept in opened}) != len(opened):
             raise ProtocolError("resume names a body twice; expected its newest checkpoint only")
         resumed: list[Resumed] = []
@@ -218,9 +219,10 @@ class Session:
         """Whether something is under way."""
         return bool(self._tickets)
 
-    @property
-    def _bond(self) -> Bond:
-        return Bond(self._host.model.sha256, self._host.fingerprint, self._agreed.digest)
+    def _bound(self) -> Bond:
+        if self._bond is None:
+            self._bond = Bond(self._host.model.sha256, self._host.fingerprint, self._agreed.digest)
+        return self._bond
 
     def _is_held(self, body: str) -> bool:
         """Whether a body holds its pose for a calibration, of which a checkpoint would know nothing."""
@@ -242,7 +244,7 @@ class Session:
             return None
         if self._host.seal is None or ticket.source != self._agreed.terms.source:
             return None  # after a calibration, a state before it belongs to terms that no longer hold
-        content = pack(self._bond, body.bookkeeping(ticket), body.answers(), outcome.memory)
+        content = pack(self._bound(), body.bookkeeping(ticket), body.answers(), outcome.memory)
         return Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=self._host.seal(content))
 
     def _frame(self, frame: Frame, group: int | None = None, place: int = 0) -> list[Event]:
@@ -320,7 +322,7 @@ class Session:
         if found is None:
             return []
         self._calibrating = None
-        self._agreement = self._agreed.aligned(found.skeleton)
+        self._agreement, self._bond = self._agreed.aligned(found.skeleton), None
         for known in self._roster:
             known.adopt(self._agreement.terms)
         message = SessionCalibrated(

@@ -6,8 +6,9 @@ a gap up to `INTERPOLATE_S` is interpolated · up to `HOLD_S` the steps inside i
 a longer one starts anew · so does a clock that ran back by more than `HOLD_S`; less than that is a late frame.
 """
 
-from dataclasses import dataclass
 from typing import Literal
+
+import msgspec
 
 INTERPOLATE_S = 0.25
 """Longest gap between two poses that is bridged by SLERP."""
@@ -21,8 +22,7 @@ SAME_INSTANT_S = 1e-6
 TimelineFlag = Literal["between_steps", "interpolated", "held", "gap_reset", "clock_reset", "late"]
 
 
-@dataclass(frozen=True, slots=True)
-class Instant:
+class Instant(msgspec.Struct, frozen=True, gc=False):
     """One step of the grid."""
 
     index: int
@@ -34,8 +34,7 @@ class Instant:
     """Inside a gap too long to interpolate: the old pose stays, unobserved."""
 
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
+class Timeline(msgspec.Struct, frozen=True, gc=False):
     """Where a body stands on its grid."""
 
     origin: float  # seconds, time of step 0
@@ -44,8 +43,7 @@ class Timeline:
     """Steps taken since the reset; also the index of the next one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Advance:
+class Advance(msgspec.Struct, frozen=True, gc=False):
     """What one pose did to a timeline."""
 
     timeline: Timeline | None
