@@ -113,7 +113,9 @@ def test_a_batch_on_its_way_gives_each_row_what_it_gets_alone(arrived, held):
     for row in range(6):
         one = slice(row, row + 1)
         a, b = (Poses(each.rotations[one], each.observed[one]) for each in (old, new))
-        turned = slerp(a.rotations, b.rotations, np.full((1, 13), fraction[row]))  # the plain way: turn all, then choose
+        turned = slerp(
+            a.rotations, b.rotations, np.full((1, 13), fraction[row])
+        )  # the plain way: turn all, then choose
         expected = np.where(held[row], a.rotations, np.where(arrived[row], b.rotations, turned)).astype(np.float32)
         seen = np.where(arrived[row], b.observed, a.observed & b.observed) & ~held[row]
         assert np.array_equal(rotations[one], expected)

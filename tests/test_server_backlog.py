@@ -5,6 +5,7 @@ import asyncio
 from bodies import motion
 from fervor.engine.batcher import Run
 from fervor.server.backlog import Backlog
+from fervor.server.turn import Turn
 from live import frames_of, talk
 
 
@@ -26,7 +27,7 @@ class Queue:
 
 async def test_who_waits_comes_on_one_by_one() -> None:
     queue = Queue()
-    backlog = Backlog(queue, most=10)
+    backlog = Backlog(queue, Turn(queue), most=10)
     queue.depth = 10
     passed: list[int] = []
 

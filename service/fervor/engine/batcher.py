@@ -57,6 +57,11 @@ class Batcher:
         self.depth += 1
         self._schedule()
 
+    def run(self) -> None:
+        """Run what waits without another turn of the loop; for who has just submitted all that it had."""
+        if self._waiting:
+            self._run()
+
     def release(self, slot: int) -> None:
         """Free a slot once its tickets have run."""
         if slot in self._waiting:
@@ -73,6 +78,8 @@ class Batcher:
     def _run(self) -> None:
         """One batch: the oldest ticket of every slot that has one."""
         self._scheduled = False
+        if not self._waiting:
+            return  # `run` was first
         batch = [self._take(slot) for slot in list(self._waiting)[:MOST_TICKETS]]
         tickets = [ticket for ticket, _ in batch]
         start, since = time.perf_counter(), self._since

@@ -151,9 +151,10 @@ class Engine:
     ) -> tuple[Floats, Floats, States]:
         """One step of the model, cut into calls: intensity [row], by emotion [row, 11], next states."""
         parts = [
-            self._call_once(*(array[first : first + MOST_ROWS] for array in (rotations, mask, emotion)), {
-                name: state[first : first + MOST_ROWS] for name, state in states.items()
-            })
+            self._call_once(
+                *(array[first : first + MOST_ROWS] for array in (rotations, mask, emotion)),
+                {name: state[first : first + MOST_ROWS] for name, state in states.items()},
+            )
             for first in range(0, len(rotations), MOST_ROWS)
         ]
         if len(parts) == 1:

@@ -3,19 +3,23 @@
 import json
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar
 
 import msgpack
+import msgspec
 from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import FrameError, MessageError
 from fervor.protocol.frame_decoder import frames_from_json, frames_from_msgpack
 from fervor.protocol.messages import PROTOCOL, ClientMessage, Estimate, Estimates, ServerMessage
+from fervor.protocol.raw_frame import RawFrame, RawFrames, raw_frames
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 _SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
 
+
+_pack: Callable[[object], bytes] = msgspec.msgpack.Encoder().encode
 
 _Message = TypeVar("_Message")
 
@@ -28,6 +32,9 @@ class Codec(Protocol):
 
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError."""
+
+    def decode_raw(self, data: str | bytes) -> RawFrame | RawFrames | None:
+        """Frames with raw joints, for who takes many at once; None where it is any other message."""
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -45,6 +52,10 @@ class JsonCodec:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
         frames = frames_from_json(data) if isinstance(data, str) else None
         return frames or self._decode(_CLIENT, data)
+
+    def decode_raw(self, data: str | bytes) -> RawFrame | RawFrames | None:  # noqa: ARG002  # see `Codec`
+        """None: JSON has no raw joints."""
+        return None
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -74,6 +85,10 @@ class MsgpackCodec:
         frames = frames_from_msgpack(data) if isinstance(data, bytes) else None
         return frames or self._decode(_CLIENT, data)
 
+    def decode_raw(self, data: str | bytes) -> RawFrame | RawFrames | None:
+        """Frames with raw joints, for who takes many at once; None where it is any other message."""
+        return raw_frames(data) if isinstance(data, bytes) else None
+
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
         return self._decode(_SERVER, data)
@@ -82,14 +97,12 @@ class MsgpackCodec:
         """The message as MessagePack; fields that say nothing are left out."""
         match message:
             case Estimate():  # nothing in it needs pydantic's help: its fields are what is packed
-                packed = msgpack.packb(vars(message))
+                return _pack(vars(message))
             case Estimates():
                 estimates = [vars(estimate) for estimate in message.estimates]
-                packed = msgpack.packb({"type": message.type, "estimates": estimates})
+                return _pack({"type": message.type, "estimates": estimates})
             case _:
-                packed = msgpack.packb(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
-        assert isinstance(packed, bytes)
-        return packed
+                return _pack(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
 
     @staticmethod
     def _decode(adapter: TypeAdapter[_Message], data: str | bytes) -> _Message:

@@ -9,7 +9,7 @@ conversation.
 import asyncio
 import logging
 import secrets
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from typing import assert_never
 
 from fervor.errors import CloseCode, EngineError, FervorError, IdleTimeout, MessageError, Overloaded, StartTimeout
@@ -26,13 +26,16 @@ from fervor.protocol.messages import (
     SessionStarted,
     Totals,
 )
+from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.server.outbox import Outbox
 from fervor.server.pace import Pace
 from fervor.server.service import Service
 from fervor.server.traffic import Traffic
 from fervor.server.wire import Wire
 from fervor.session.events import Close, Event, Outcome, Release, Reply, Restore, Ticket
+from fervor.session.poses import Read
 from fervor.session.session import Session
+from fervor.session.start import Agreement
 from fervor.session.state import SessionState
 
 log = logging.getLogger(__name__)
@@ -66,6 +69,7 @@ class Conversation:
         self._codec = codec
         self._settings = service.settings
         self._batcher = service.batcher
+        self._turn = service.turn
         self._backlog = service.backlog
         self._drain = service.drain
         self._metrics = service.metrics
@@ -82,6 +86,7 @@ class Conversation:
         self._opened = self._heard = self._loop.time()  # seconds; `heard`: when the newest message came
         self._pace = Pace(service.settings.max_frames_per_second, service.settings.max_frames_per_message)
         self._unanswered = 0
+        self._in_turn = 0  # messages that wait for the end of a turn
         self._waits_for_message = False
         self._room = asyncio.Event()
         self._patience = asyncio.timeout(None)
@@ -120,19 +125,20 @@ class Conversation:
             self._note(message)
             if self._backlog.full:
                 await self._backlog.wait()
-            self._take(message)
+            self._act_on(message)
             while self._has_enough:
                 self._room.clear()
                 await self._room.wait()
 
     def _take_at_once(self, message: str | bytes) -> bool:
-        """Take a message in the turn in which it came, unless something holds it back: then `_listen` gets it."""
+        """Take a message with all of its turn, unless something holds it back: then `_listen` gets it."""
         if not self._waits_for_message or self._backlog.full or self._has_enough:
             return False
         if self._session.state is SessionState.CLOSED:
             return False
         self._note(message)
-        self._take(message)
+        self._in_turn += 1
+        self._turn.put(self, message)
         return True
 
     def _note(self, message: str | bytes) -> None:
@@ -142,7 +148,7 @@ class Conversation:
     @property
     def _has_enough(self) -> bool:
         """Whether so many frames are unanswered that no more are taken just now."""
-        return self._unanswered >= self._settings.max_unanswered_frames
+        return self._unanswered + self._in_turn >= self._settings.max_unanswered_frames
 
     def _sign_off(self) -> None:
         totals, seconds = self.totals, self._loop.time() - self._opened
@@ -199,27 +205,43 @@ class Conversation:
         if self._leaving and not self._session.busy:
             self._carry_out(self._session.interrupt())
 
-    def _take(self, data: str | bytes) -> None:
+    @property
+    def agreement(self) -> Agreement | None:
+        """See `Taker`."""
+        return self._session.agreement
+
+    def decode_raw(self, message: str | bytes) -> RawFrame | RawFrames | None:
+        """See `Taker`."""
+        return self._codec.decode_raw(message)
+
+    def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
+        """See `Taker`."""
+        self._in_turn -= 1
+        self._room.set()
+        if self._session.state is not SessionState.CLOSED:
+            self._act_on(message, raw, poses)
+
+    def _act_on(self, data: str | bytes, raw: RawFrame | RawFrames | None = None, poses: Sequence[Read] = ()) -> None:
         if self._leaving:
             return  # what comes now is after the last checkpoint: the client sends it again where it resumes
         try:
-            self._carry_out(self._understand(data))
+            self._carry_out(self._understand(data, raw, poses))
         except Exception as fault:  # noqa: BLE001  # a fault of ours ends this session with a word, and no other
             self._give_up(fault)
 
-    def _understand(self, data: str | bytes) -> list[Event]:
+    def _understand(self, data: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> list[Event]:
         """What a message brings. Whatever it is, it counts as a frame of the pace, at least."""
         try:
             self._pace.take(1, self._heard)
-            message = self._decode(data)
-            if isinstance(message, Frames):
+            message = raw or self._decode(data)
+            if isinstance(message, Frames | RawFrames):
                 more = min(len(message.frames), self._settings.max_frames_per_message) - 1
                 self._pace.take(more, self._heard)
         except FervorError as error:
             return self._session.refuse(error)
         if isinstance(message, SessionStart):
             self._latest = message.delivery == "latest"
-        return self._session.receive(message)
+        return self._session.receive(message, poses)
 
     def _decode(self, data: str | bytes) -> ClientMessage:
         try:

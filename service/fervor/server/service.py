@@ -22,6 +22,7 @@ from fervor.server.sessions import Sessions
 from fervor.server.shedding import Shedding
 from fervor.server.tokens import Tokens
 from fervor.server.tracing import Tracing
+from fervor.server.turn import Turn
 from fervor.server.watchers import Watchers
 from fervor.session.host import Host
 from fervor.settings import Settings
@@ -37,6 +38,7 @@ class Service:
     settings: Settings
     model: Model
     batcher: Batcher
+    turn: Turn
     host: Host
     tokens: Tokens
     page_tokens: Tokens
@@ -66,6 +68,7 @@ class Service:
         multiple = check_row_independence(model)
         engine = Engine(model, capacity=settings.capacity + OWN_BODIES, row_multiple=multiple)
         batcher = Batcher(engine)
+        turn = Turn(batcher)
         drain, connections = Drain(), Connections(settings.max_connections)
         shedding = Shedding(batcher, most_delay_s=settings.max_queue_delay_s)
         scoring = _scoring(settings, path, model, multiple)
@@ -76,13 +79,14 @@ class Service:
             settings=settings,
             model=model,
             batcher=batcher,
+            turn=turn,
             host=_host(settings, model, engine),
             tokens=tokens,
             page_tokens=Tokens.of_watchers(settings, tokens),
             origins=Origins(settings.origins),
             connections=connections,
             sessions=Sessions(settings, slots=slots, drain=drain, shedding=shedding, metrics=metrics),
-            backlog=Backlog(batcher, most=settings.max_queue),
+            backlog=Backlog(batcher, turn, most=settings.max_queue),
             shedding=shedding,
             drain=drain,
             metrics=metrics,

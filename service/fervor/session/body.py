@@ -105,7 +105,7 @@ class Body:
         """
         label = self._label if emotion is None else make_label(emotion, time, self._terms.emotion_ttl_s)
         late = seq <= self.newest_seq
-        lost = not bool(pose.observed.any())
+        lost = pose.lost
         fresh = self._timeline is None
         moved = self._move(time, late=late, lost=lost)
         self.newest_seq = max(seq, self.newest_seq)
@@ -128,7 +128,7 @@ class Body:
             source=self._terms.source,
             pose=None if lost or late or "late" in flags else pose,
             fresh=fresh or moved.fresh,
-            steps=tuple(map(self._step, moved.instants)),
+            steps=tuple([self._step(instant) for instant in moved.instants]),
             flags=flags,
             since=moved.timeline.origin if moved.timeline else time,
             group=group,

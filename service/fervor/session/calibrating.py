@@ -48,7 +48,7 @@ class Calibrating:
         """
         if self._start is None:
             self._start = time
-        self._poses.append(pose)
+        self._poses.append(pose.copy())
         if len(self._poses) > MOST_FRAMES:
             raise InputError(f"{MOST_FRAMES} frames came before {self.request.seconds} s were over; check t")
         if time - self._start < self.request.seconds:

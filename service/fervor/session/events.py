@@ -57,12 +57,32 @@ class Source:
     axes: Axes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pose:
+class Block(msgspec.Struct, frozen=True, eq=False, gc=False):
+    """The joints of frames of one source that came together."""
+
+    joints: npt.NDArray[np.float64]  # [frame, joint, 4] rotations xyzw
+    observed: npt.NDArray[np.bool_]  # [frame, joint]
+
+
+class Pose(msgspec.Struct, frozen=True, eq=False, gc=False):
     """The joints of one frame in the order of its source's."""
 
     joints: npt.NDArray[np.float64]  # [joint, 4] rotations xyzw, or [joint, 3] positions of landmarks
     observed: npt.NDArray[np.bool_]  # [joint]
+    unseen: bool | None = None
+    """Whether no joint is observed, where that is known already."""
+    block: Block | None = None
+    """Whose row it is, if any: then its arrays are views."""
+    row: int = 0
+
+    @property
+    def lost(self) -> bool:
+        """Whether no joint is observed."""
+        return not self.observed.any() if self.unseen is None else self.unseen
+
+    def copy(self) -> "Pose":
+        """The same in arrays of its own, to be kept."""
+        return Pose(self.joints.copy(), self.observed.copy(), self.unseen)
 
 
 class Step(msgspec.Struct, frozen=True, gc=False):

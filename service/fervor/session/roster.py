@@ -81,6 +81,11 @@ class Roster:
         del self._bodies[name]
         return Release(body.slot)
 
+    @property
+    def has_spare(self) -> bool:
+        """Whether there is a slot that nobody took over."""
+        return bool(self._spare)
+
     def spare(self) -> list[Release]:
         """The slots that nobody took over."""
         spare, self._spare = self._spare, []

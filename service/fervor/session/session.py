@@ -14,7 +14,6 @@ from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
     Checkpoint,
-    ClientMessage,
     Error,
     Estimate,
     Estimates,
@@ -31,6 +30,7 @@ from fervor.protocol.messages import (
     SessionStarted,
     Totals,
 )
+from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
 from fervor.session.calibrating import Calibrating
@@ -38,9 +38,18 @@ from fervor.session.checkpoint import Bond, pack, unpack
 from fervor.session.events import Close, Event, Outcome, Pose, Reply, Restore, Source, Ticket
 from fervor.session.groups import Groups
 from fervor.session.host import Host
+from fervor.session.poses import Read
 from fervor.session.roster import Roster
 from fervor.session.start import Agreement, agree
 from fervor.session.state import SessionState, transition
+
+AnyFrame = Frame | RawFrame
+
+Rare = SessionStart | BodyReset | BodyEnd | SessionCalibrate | Ping | SessionEnd
+"""What comes now and then."""
+
+Incoming = AnyFrame | Frames | RawFrames | Rare
+"""A client's message, with frames in either form."""
 
 
 class Session:
@@ -75,10 +84,23 @@ class Session:
         """What kind of joints it gets; None before its start."""
         return None if self._agreement is None else self._agreement.terms.source
 
-    def receive(self, message: ClientMessage) -> list[Event]:
-        """What a message brings. Errors come back as replies; a fatal one is followed by `Close`."""
+    def agreement(self) -> Agreement | None:
+        """What was agreed on; None before the start."""
+        return self._agreement
+
+    def receive(self, message: Incoming, poses: Sequence[Read] = ()) -> list[Event]:
+        """What a message brings. Errors come back as replies; a fatal one is followed by `Close`.
+
+        Args:
+            message: as it came.
+            poses: of its frames, where they were read already.
+        """
         try:
             self.state = transition(self.state, message.type)
+            if isinstance(message, Frame | RawFrame):
+                return self._frame(message, poses[0] if poses else None)
+            if isinstance(message, Frames | RawFrames):
+                return self._frames(message.frames, poses)
             return self._dispatch(message)
         except FervorError as error:
             return self.refuse(error)
@@ -90,7 +112,7 @@ class Session:
         if not error.fatal and self.state is SessionState.NEW:
             error = ProtocolError(f"the session could not start: {error.message}")
         if isinstance(error, FrameError) and error.seq is not None:
-            self._count("rejected")
+            self._totals["rejected"] += 1
         reply = Reply(_error(error))
         return [reply, *self._close(error.close_code, error.code)] if error.close_code else [reply]
 
@@ -101,6 +123,8 @@ class Session:
         """
         if ticket not in self._tickets or self.state is SessionState.CLOSED:
             return []
+        if not self._outcomes and ticket is next(iter(self._tickets)):  # in order, and nothing waits for it
+            return self._conclude(ticket, outcome)
         self._outcomes[ticket] = outcome
         events: list[Event] = []
         while self._tickets and (oldest := next(iter(self._tickets))) in self._outcomes:
@@ -111,10 +135,11 @@ class Session:
         body, place = self._tickets.pop(ticket)
         events: list[Event] = []
         if isinstance(outcome, EngineError):
-            events += self._fail(ticket, body, outcome)
+            events = self._fail(ticket, body, outcome)
         elif ticket.answer:
-            events += self._deliver(ticket.group, place, body.conclude(ticket, outcome), body)
-        events += self._follow(ticket, body, outcome)
+            events = self._deliver(ticket.group, place, body.conclude(ticket, outcome), body)
+        if ticket.group is not None or ticket.checkpoint is not None or self._calibrated:
+            events += self._follow(ticket, body, outcome)
         if self.state is SessionState.ENDING and not self._tickets:
             events += self._ended("ended by the client")
         return events
@@ -132,17 +157,13 @@ class Session:
             return []
         return self._close(CloseCode.RESTART, "the service restarts; connect again and resume")
 
-    def _dispatch(self, message: ClientMessage) -> list[Event]:
+    def _dispatch(self, message: Rare) -> list[Event]:
         match message:
             case SessionStart():
                 return self._start(message)
-            case Frame():
-                return self._frame(message)
-            case Frames():
-                return self._frames(message)
             case BodyReset():
                 self._roster.known(message.body).reset()
-                self._count("resets")
+                self._totals["resets"] += 1
                 return []
             case BodyEnd():
                 return [self._roster.end(message.body), *self._let_go(message.body)]
@@ -247,44 +268,54 @@ class Session:
         content = pack(self._bound(), body.bookkeeping(ticket), body.answers(), outcome.memory)
         return Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=self._host.seal(content))
 
-    def _frame(self, frame: Frame, group: int | None = None, place: int = 0) -> list[Event]:
+    def _frame(
+        self, frame: AnyFrame, read: Read | None = None, group: int | None = None, place: int = 0
+    ) -> list[Event]:
         """The work of one frame. A bad one is told and leaves no trace."""
         try:
-            events = self._plan(frame, group, place)
+            events = self._plan(frame, read, group, place)
         except FervorError as error:
-            self._count("rejected")
+            self._totals["rejected"] += 1
             events = [Reply(_error(error, frame))]
-        return [*self._roster.spare(), *events]
+        return [*self._roster.spare(), *events] if self._roster.has_spare else events
 
-    def _plan(self, frame: Frame, group: int | None, place: int) -> list[Event]:
+    def _plan(self, frame: AnyFrame, read: Read | None, group: int | None, place: int) -> list[Event]:
         agreement = self._agreed
         time = agreement.time_of(frame)
-        pose = agreement.pose_of(frame)
-        known = self._roster.find(frame.body, time)
-        if known is not None and (answer := known.answered(frame.seq)) is not None:
-            self._count("duplicate")
+        pose = agreement.pose_of(_plain(frame)) if read is None else read
+        if isinstance(pose, FrameError):
+            raise pose
+        body = self._roster.find(frame.body, time)
+        known = body is not None
+        if body is not None and frame.seq <= body.newest_seq and (answer := body.answered(frame.seq)) is not None:
+            self._totals["duplicate"] += 1
             if group is None:
                 return [Reply(answer)]
             self._groups.put(group, place, answer)
             return []
         if frame.emotion is not None:
             emotion_vector(frame.emotion)  # before a body is opened for it: a bad frame leaves no trace
-        body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
-        gone = [] if known is not None else self._let_go_of_forgotten(frame.body)
+        if body is None:
+            body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
+        gone = [] if known or self._calibrating is None else self._let_go_of_forgotten(frame.body)
         keep = not self._is_held(frame.body)
         ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep)
         self._tickets[ticket] = (body, place)
         if group is not None:
             self._groups.expect(group)
         self._note(ticket)
+        if self._calibrating is None:
+            return [ticket]
         return [*gone, ticket, *self._calibrate(ticket, pose)]
 
-    def _frames(self, message: Frames) -> list[Event]:
+    def _frames(self, frames: Sequence[AnyFrame], poses: Sequence[Read]) -> list[Event]:
         most = self._host.limits.max_frames_per_message
-        if len(message.frames) > most:
-            raise FrameError(f"a message has {len(message.frames)} frames; this service takes at most {most}")
+        if len(frames) > most:
+            raise FrameError(f"a message has {len(frames)} frames; this service takes at most {most}")
         group, agreement = self._groups.open(), self._agreement
-        events = [event for place, frame in enumerate(message.frames) for event in self._frame(frame, group, place)]
+        events: list[Event] = []
+        for place, frame in enumerate(frames):
+            events += self._frame(frame, poses[place] if poses else None, group, place)
         if self._agreement is not agreement:  # calibrated: the rest of the message is answered before that is told
             events += self.checkpoints(group)
         return events + self._close_group(group)
@@ -301,7 +332,7 @@ class Session:
 
     def _deliver(self, group: int | None, place: int, estimate: Estimate, body: Body) -> list[Event]:
         """Send an estimate, or put it with its group; delivery `latest` skips one that a newer is about to replace."""
-        self._count("estimates")
+        self._totals["estimates"] += 1
         if group is not None:
             self._groups.put(group, place, estimate)
             return []
@@ -380,13 +411,12 @@ class Session:
         return [*self._roster.clear()]
 
     def _note(self, ticket: Ticket) -> None:
-        self._count("frames")
+        self._totals["frames"] += 1
+        if not ticket.flags:
+            return
         self._totals["late"] += "late" in ticket.flags
         self._totals["duplicate"] += "duplicate" in ticket.flags
         self._totals["resets"] += "gap_reset" in ticket.flags or "clock_reset" in ticket.flags
-
-    def _count(self, what: str) -> None:
-        self._totals[what] += 1
 
     @property
     def _agreed(self) -> Agreement:
@@ -395,7 +425,11 @@ class Session:
         return self._agreement
 
 
-def _error(error: FervorError, frame: Frame | None = None) -> Error:
+def _plain(frame: AnyFrame) -> Frame:
+    return frame.to_frame() if isinstance(frame, RawFrame) else frame
+
+
+def _error(error: FervorError, frame: AnyFrame | None = None) -> Error:
     """The wire form of an error; one that a frame caused names the frame and ends nothing."""
     return Error(
         code=error.code,

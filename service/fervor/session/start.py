@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -12,6 +13,7 @@ from fervor.errors import FrameError, InputError
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Emotion, Frame, SessionStart
 from fervor.protocol.poses import frame_points, frame_pose
+from fervor.protocol.raw_frame import RawFrame
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
 from fervor.session.checkpoint import digest
@@ -20,7 +22,24 @@ from fervor.session.label import NO_LABEL, Label, make_label
 from fervor.skeletons.adapter import check_axes
 from fervor.skeletons.catalog import source
 from fervor.skeletons.landmarks import Landmarks
-from fervor.skeletons.skeleton import QuaternionOrder, Skeleton
+from fervor.skeletons.skeleton import Axes, QuaternionOrder, Skeleton
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout:
+    """How raw rotations lie in a frame; one object for all sessions that agreed on the same."""
+
+    joints: int
+    """Sent."""
+    order: QuaternionOrder
+    known: int
+    """Joints of the skeleton."""
+    places: npt.NDArray[np.intp] | None  # [joint sent] as of an agreement
+
+    @property
+    def size(self) -> int:
+        """Bytes of a frame's joints."""
+        return 16 * self.joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,12 +57,14 @@ class Agreement:
     """Seconds a frame stands for where it brings no time (clock `frames`)."""
     places: npt.NDArray[np.intp] | None
     """[joint sent] its place in the skeleton; None where all are sent in the skeleton's order."""
+    layout: Layout | None
+    """None of a landmark sensor."""
 
     def first_label(self, time: float) -> Label:
         """The label of a body that comes at `time` (seconds, client clock)."""
         return NO_LABEL if self.emotion is None else make_label(self.emotion, time, self.terms.emotion_ttl_s)
 
-    def time_of(self, frame: Frame) -> float:
+    def time_of(self, frame: Frame | RawFrame) -> float:
         """The frame's time in seconds.
 
         Raises:
@@ -110,11 +131,14 @@ def agree(
         InputError: an unknown skeleton, joint or emotion, or axes that the skeleton can't have.
     """
     known = _known(start.skeleton, skeletons)
-    sensor = Source(known, "global" if isinstance(known, Landmarks) else start.axes or known.axes)
+    sensor = _source(known, "global" if isinstance(known, Landmarks) else start.axes or known.axes)
     if isinstance(known, Skeleton):
         check_axes(known, sensor.axes)
     if start.emotion is not None:
         emotion_vector(start.emotion)
+    joints, places = start.joints or known.joints, _places(start.joints, known.joints, known.name)
+    order = start.quaternion or (known.quaternion if isinstance(known, Skeleton) else "xyzw")
+    among = None if places is None else tuple(places.tolist())
     return Agreement(
         terms=Terms(
             metadata=metadata,
@@ -125,13 +149,25 @@ def agree(
             by_emotion=start.by_emotion,
             checkpoint_s=start.checkpoint_s,
         ),
-        joints=start.joints or known.joints,
-        order=start.quaternion or (known.quaternion if isinstance(known, Skeleton) else "xyzw"),
+        joints=joints,
+        order=order,
         latest=start.delivery == "latest",
         emotion=start.emotion,
         frame_s=1.0 / (start.nominal_hz or metadata.rate_hz),
-        places=_places(start.joints, known.joints, known.name),
+        places=places,
+        layout=None if isinstance(known, Landmarks) else _layout(len(joints), order, len(known.joints), among),
     )
+
+
+@lru_cache(maxsize=64)
+def _source(skeleton: Skeleton | Landmarks, axes: Axes) -> Source:
+    """One object for all sessions with this sensor."""
+    return Source(skeleton, axes)
+
+
+@lru_cache(maxsize=64)
+def _layout(joints: int, order: QuaternionOrder, known: int, places: tuple[int, ...] | None) -> Layout:
+    return Layout(joints, order, known, None if places is None else np.array(places, np.intp))
 
 
 def _known(asked: str | SkeletonSpec, skeletons: Mapping[str, Skeleton]) -> Skeleton | Landmarks:

@@ -1,0 +1,141 @@
+"""A turn's messages pass each stage together, in the order in which they came."""
+
+import asyncio
+from collections.abc import Sequence
+
+import msgpack
+import numpy as np
+import pytest
+
+from bodies import host, model, motion
+from fervor.engine.batcher import Batcher, Run
+from fervor.engine.engine import Engine
+from fervor.errors import EngineError, FervorError
+from fervor.protocol.codec import MsgpackCodec
+from fervor.protocol.messages import Estimate
+from fervor.protocol.raw_frame import RawFrame, RawFrames
+from fervor.server.turn import Turn
+from fervor.session.events import Outcome, Reply, Ticket
+from fervor.session.poses import Read
+from fervor.session.session import Session
+from fervor.session.start import Agreement
+
+CODEC = MsgpackCodec()
+
+
+class Talk:
+    """A session that takes its messages from a turn."""
+
+    def __init__(self, batcher: Batcher) -> None:
+        self.batcher = batcher
+        self.session = Session("s", host(batcher.engine.claim))
+        self.said: list[object] = []
+        self.in_blocks = 0
+
+    @property
+    def agreement(self) -> Agreement | None:
+        return self.session.agreement
+
+    def decode_raw(self, message: str | bytes) -> RawFrame | RawFrames | None:
+        return CODEC.decode_raw(message)
+
+    def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
+        self.in_blocks += len(poses)
+        try:
+            events = self.session.receive(raw or CODEC.decode_client(message), poses)
+        except FervorError as error:
+            events = self.session.refuse(error)
+        self.carry(events)
+
+    def carry(self, events) -> None:
+        for event in events:
+            if isinstance(event, Ticket):
+                self.batcher.submit(event, self.deliver)
+            elif isinstance(event, Reply):
+                self.said.append(event.message)
+
+    def deliver(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
+        self.carry(self.session.conclude(ticket, outcome))
+
+    def estimates(self) -> list[Estimate]:
+        return [message for message in self.said if isinstance(message, Estimate)]
+
+
+def start(**more) -> bytes:
+    return msgpack.packb({"type": "session.start", "emotion": "joy", **more})
+
+
+def frames(seed: int, count: int) -> list[bytes]:
+    poses = motion(count, seed=seed).astype("<f4")
+    return [
+        msgpack.packb({"type": "frame", "seq": seq, "t": seq / 25, "q": pose.tobytes()})
+        for seq, pose in enumerate(poses)
+    ]
+
+
+async def settle(batcher: Batcher, turn: Turn) -> None:
+    async with asyncio.timeout(30):
+        while turn.depth or batcher.depth:
+            await asyncio.sleep(0)
+
+
+@pytest.fixture
+def batcher() -> Batcher:
+    return Batcher(Engine(model(), capacity=32))
+
+
+async def test_estimates_are_those_of_the_plain_way_to_the_bit(batcher: Batcher) -> None:
+    turn = Turn(batcher)
+    together, alone = ([Talk(batcher) for _ in range(12)] for _ in range(2))
+    for talk in (*together, *alone):
+        talk.carry(talk.session.receive(CODEC.decode_client(start())))
+    for messages in zip(*(frames(seed, 40) for seed in range(12)), strict=True):
+        for talk, message in zip(together, messages, strict=True):
+            turn.put(talk, message)
+        await settle(batcher, turn)
+        for talk, message in zip(alone, messages, strict=True):
+            talk.carry(talk.session.receive(CODEC.decode_client(message)))
+            batcher.run()
+    assert [talk.in_blocks for talk in together] == [40] * 12
+    assert [talk.estimates() for talk in together] == [talk.estimates() for talk in alone]
+    assert all(len(talk.estimates()) == 40 for talk in alone)
+
+
+async def test_one_run_for_a_turn_and_none_for_nothing(batcher: Batcher) -> None:
+    turn, runs = Turn(batcher), []
+    batcher.watch(runs.append)
+    talks = [Talk(batcher) for _ in range(5)]
+    for talk in talks:
+        turn.put(talk, start())
+        turn.put(talk, frames(0, 1)[0])  # behind its own start: read by its session
+    await settle(batcher, turn)
+    await asyncio.sleep(0)
+    assert [run.size for run in runs if isinstance(run, Run)] == [5]
+    assert [talk.in_blocks for talk in talks] == [0] * 5
+    assert all(len(talk.estimates()) == 1 for talk in talks)
+
+
+async def test_order_is_kept_between_frames_and_all_else(batcher: Batcher) -> None:
+    turn, talk = Turn(batcher), Talk(batcher)
+    first, second, third = frames(1, 3)
+    reset = msgpack.packb({"type": "body.reset", "body": "0"})
+    for message in (start(), first, second, reset, third):
+        turn.put(talk, message)
+    await settle(batcher, turn)
+    assert [estimate.flags for estimate in talk.estimates()][:1] == [()]
+    assert [estimate.flags for estimate in talk.estimates()][2] == ("reset",)
+
+
+async def test_a_poisoned_frame_costs_its_neighbours_nothing(batcher: Batcher) -> None:
+    turn, talks = Turn(batcher), [Talk(batcher) for _ in range(3)]
+    for talk in talks:
+        turn.put(talk, start())
+    await settle(batcher, turn)
+    nan = np.full((13, 4), np.nan, "<f4").tobytes()
+    turn.put(talks[0], frames(0, 1)[0])
+    turn.put(talks[1], msgpack.packb({"type": "frame", "seq": 0, "t": 0.0, "q": nan}))
+    turn.put(talks[2], frames(0, 1)[0])
+    await settle(batcher, turn)
+    assert talks[0].estimates() == talks[2].estimates() != []
+    assert talks[1].estimates() == []
+    assert talks[1].said[-1].code == "bad_frame"
