@@ -74,7 +74,8 @@ def test_it_finds_what_a_complete_parser_finds(stream: bytes, cuts: list[int]) -
     whole.feed(stream)
     rest, cutter = Parser(), Cutter(most_bytes=MOST)
     for piece in pieces(stream, cuts):
-        for part in cutter.cut(piece):
+        message = cutter.whole(piece)
+        for part in cutter.cut(piece) if message is None else [Message(message, is_text=False)]:
             if isinstance(part, bytes):
                 rest.feed(part)
             elif rest.open:  # a parser that has failed, or was told good-bye, takes nothing more
@@ -89,6 +90,14 @@ def test_a_whole_message_never_reaches_the_complete_parser() -> None:
         Message(b"one", is_text=True),
         Message(b"two" * 100, is_text=False),
     ]
+
+
+def test_what_comes_alone_and_whole_is_found_without_cutting() -> None:
+    cutter = Cutter(most_bytes=MOST)
+    for payload in (b"", b"two", b"x" * 125, b"x" * 126, b"x" * 65_535):
+        assert cutter.whole(frame(0x82, payload, b"efgh")) == payload
+    for other in (frame(0x81, b"text", b"efgh"), frame(0x82, b"bare", None), frame(0x82, b"", b"efgh")[:-1], b"\x82"):
+        assert cutter.whole(other) is None
 
 
 def test_after_a_frame_that_was_passed_on_it_finds_messages_again() -> None:

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from fervor.session.lanes import FADE_S, LANES, PERIOD_S, lane_plan, plan_row, schedule
+from fervor.session.lanes import FADE_S, LANES, PERIOD_S, lane_plan, schedule
 
 RATE = 30.0
 
@@ -56,7 +56,7 @@ def test_first_four_seconds_run_one_lane_only():
 def test_the_plan_says_of_every_step_what_its_schedule_says(memory, rate):
     plan = lane_plan(rate)
     for index in [*range(round(3 * PERIOD_S * rate)), 100_000]:
-        row = plan_row(memory, index, rate)
+        row = plan.row(memory, index)
         lanes = {step.lane: step for step in schedule(memory, index, rate)}
         for lane in range(LANES):
             step = lanes.get(lane)

@@ -6,6 +6,7 @@ depend on what else is in its batch: the model was checked for that at start-up,
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 import numpy.typing as npt
@@ -152,10 +153,9 @@ class Engine:
         """One step of the model, cut into calls: intensity [row], by emotion [row, 11], next states."""
         parts = [
             self._call_once(
-                *(array[first : first + MOST_ROWS] for array in (rotations, mask, emotion)),
-                {name: state[first : first + MOST_ROWS] for name, state in states.items()},
+                rotations[cut], mask[cut], emotion[cut], {name: state[cut] for name, state in states.items()}
             )
-            for first in range(0, len(rotations), MOST_ROWS)
+            for cut in (slice(first, first + MOST_ROWS) for first in range(0, len(rotations), MOST_ROWS))
         ]
         if len(parts) == 1:
             return parts[0]
@@ -219,7 +219,7 @@ def _outcomes(
         tickets, rows.tolist(), memory.intensity.tolist(), slots.seen[rows].tolist(), jumped.tolist(), strict=True
     )
     for at, (ticket, slot, intensity, seen, jumps) in enumerate(columns):
-        known = intensity == intensity  # nan: no step yet
+        known = not isnan(intensity)  # nan: no step yet
         recalled = None if ticket.checkpoint is None else slots.recall(slot)
         yield Outcome(intensity if known else None, memory.by_emotion[at], seen, jumps, recalled)
 

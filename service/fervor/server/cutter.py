@@ -49,6 +49,22 @@ class Cutter:
         self._owed = 0.0  # bytes of the frame being passed on that are still to come
         self._in_pieces = False  # between the first and the last piece of a message
 
+    def whole(self, data: bytes) -> bytes | None:
+        """The payload where these bytes are one binary message of usual size and nothing else, as they mostly are.
+
+        None, having done nothing, where they are not: then they are to be `cut`.
+        """
+        if len(data) < 2 or data[0] != _WHOLE[1] or self._kept or self._owed or self._in_pieces:
+            return None
+        size, start = data[1] - MASKED, 2 + MASK_BYTES  # of a frame without a mask: negative
+        if not 0 <= size <= SHORT:
+            return None
+        if size == SHORT:
+            size, start = int.from_bytes(data[2:4], "big"), 4 + MASK_BYTES
+        if start + size != len(data) or size > self._most:
+            return None
+        return apply_mask(data[start:], data[start - MASK_BYTES : start])
+
     def cut(self, data: bytes) -> Iterator[Message | bytes]:
         """Messages and, as bytes, everything that is not one; what is passed on never spans two frames that are valid.
 

@@ -25,6 +25,7 @@ from fervor.server.tracing import Tracing
 from fervor.server.turn import Turn
 from fervor.server.watchers import Watchers
 from fervor.session.host import Host
+from fervor.session.spread import Spread
 from fervor.settings import Settings
 
 OWN_BODIES = 1
@@ -80,7 +81,7 @@ class Service:
             model=model,
             batcher=batcher,
             turn=turn,
-            host=_host(settings, model, engine),
+            host=_host(settings, model, batcher),
             tokens=tokens,
             page_tokens=Tokens.of_watchers(settings, tokens),
             origins=Origins(settings.origins),
@@ -97,17 +98,20 @@ class Service:
         )
 
 
-def _host(settings: Settings, model: Model, engine: Engine) -> Host:
+def _host(settings: Settings, model: Model, batcher: Batcher) -> Host:
     """What sessions know of the service."""
     seal, unseal = seal_and_open(settings)
+    spread = Spread()
+    batcher.watch(lambda _: spread.begin())  # a turn ends with its run
     return Host(
         model=model_info(model),
         metadata=model.metadata,
         limits=settings.limits,
         fingerprint=model.fingerprint,
-        claim=engine.claim,
+        claim=batcher.engine.claim,
         seal=seal,
         unseal=unseal,
+        spread=spread,
         skeletons=load_skeletons(settings.skeletons),
     )
 

@@ -33,6 +33,9 @@ LEFT_BEHIND_S = 5.0
 """Seconds that a client has to take what is left, once the conversation is over."""
 
 
+_MEDIUM, _LONG = struct.Struct("!BBH"), struct.Struct("!BBQ")
+
+
 class GuardedWebSocket(WebSocketsSansIOProtocol):
     """One WebSocket connection."""
 
@@ -72,11 +75,22 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         if self._cutter is None:
             self._parse(data)
             return
+        if self._can_take and (message := self._cutter.whole(data)) is not None:
+            if self.take is None or not self.take(message):
+                self._hand_over(Message(message, is_text=False))
+            return
         for part in self._cutter.cut(data):
             if isinstance(part, bytes):
                 self._parse(part)
             elif self.conn.state in (CONNECTING, OPEN) and not self.transport.is_closing():
                 self._hand_over(part)
+
+    @property
+    def _can_take(self) -> bool:
+        """Whether a message would go to the conversation, and none waits before it."""
+        if self.take is None or self.close_sent or self.conn.state is not OPEN:
+            return False
+        return self.queue.empty() and not self.transport.is_closing()
 
     def _parse(self, data: bytes) -> None:
         """Let the complete parser have these bytes."""
@@ -154,12 +168,10 @@ def _as_frame(message: str | bytes) -> bytes:
     opcode, payload = (Opcode.TEXT, message.encode()) if isinstance(message, str) else (Opcode.BINARY, message)
     size = len(payload)
     if size < SHORT:
-        head = struct.pack("!BB", FIN | opcode, size)
-    elif size < 65536:
-        head = struct.pack("!BBH", FIN | opcode, SHORT, size)
-    else:
-        head = struct.pack("!BBQ", FIN | opcode, SHORT + 1, size)
-    return head + payload
+        return bytes((FIN | opcode, size)) + payload
+    if size < 65536:
+        return _MEDIUM.pack(FIN | opcode, SHORT, size) + payload
+    return _LONG.pack(FIN | opcode, SHORT + 1, size) + payload
 
 
 def _reject(status: int, text: str) -> Response:

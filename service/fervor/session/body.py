@@ -19,8 +19,9 @@ from fervor.session.answers import Answers
 from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
 from fervor.session.label import NO_LABEL, Label, make_label
-from fervor.session.lanes import plan_row, window_steps
-from fervor.session.timeline import Advance, Instant, Timeline, advance, count_frame
+from fervor.session.lanes import lane_plan, window_steps
+from fervor.session.spread import Spread
+from fervor.session.timeline import SAME_INSTANT_S, Advance, Instant, Timeline, advance, count_frame
 from fervor.skeletons.rig import UPPER_BODY
 
 WARM_UP_S = 1.0
@@ -46,12 +47,35 @@ class Terms:
 class Body:
     """The bookkeeping of one body, driven by its frames alone."""
 
+    __slots__ = (
+        "_answers",
+        "_emotion",
+        "_enough",
+        "_label",
+        "_lanes",
+        "_last",
+        "_level",
+        "_next_checkpoint",
+        "_pending",
+        "_phase",
+        "_put_off",
+        "_terms",
+        "_timeline",
+        "_window",
+        "in_flight",
+        "name",
+        "newest_seq",
+        "slot",
+    )
+
     def __init__(self, name: str, slot: int, terms: Terms, label: Label = NO_LABEL) -> None:
         self.name = name
         self.slot = slot
         self.in_flight = 0
         self.newest_seq = -1
         self._terms = terms
+        self._lanes = lane_plan(terms.metadata.rate_hz)
+        self._window = window_steps(terms.memory, terms.metadata.rate_hz)
         self._label = label
         self._timeline: Timeline | None = None
         self._last: float | None = None  # seconds, newest frame with a pose or without
@@ -59,6 +83,8 @@ class Body:
         self._emotion = UNKNOWN
         self._pending: tuple[Flag, ...] = ()
         self._next_checkpoint = -math.inf  # seconds
+        self._phase = 0.0  # seconds after the beginning of a span
+        self._put_off = False
         self._answers = Answers(name)
         self._enough = _enough(terms)
 
@@ -97,42 +123,46 @@ class Body:
         emotion: str | Mapping[str, float] | None = None,
         group: int | None = None,
         keep: bool = True,
+        spread: Spread | None = None,
     ) -> Ticket:
         """The work that frame `seq` at `time` (seconds) brings; a checkpoint with it where one is due, if `keep`.
+
+        Where others are due too, `spread` may put it off to a later frame.
 
         Raises:
             InputError: an emotion that is not known; the frame then left no trace.
         """
-        label = self._label if emotion is None else make_label(emotion, time, self._terms.emotion_ttl_s)
-        late = seq <= self.newest_seq
-        lost = pose.lost
-        fresh = self._timeline is None
+        terms, label = self._terms, self._label
+        if emotion is not None:
+            label = make_label(emotion, time, terms.emotion_ttl_s)
+        late, lost, fresh = seq <= self.newest_seq, pose.lost, self._timeline is None
         moved = self._move(time, late=late, lost=lost)
-        self.newest_seq = max(seq, self.newest_seq)
-        if "late" not in moved.flags:
-            self._last, self._label = time, label
         flags: tuple[Flag, ...] = moved.flags
-        if moved.fresh:
+        if not late:
+            self.newest_seq = seq
+        if "late" not in flags:
+            self._last, self._label = time, label
+        if moved.fresh and self._pending:
             flags, self._pending = (*self._pending, *flags), ()
         if lost:
             flags = (*flags, "lost")
         if self._answers.expect(seq):
             flags = ("duplicate",)
-        self._timeline = moved.timeline
+        line = self._timeline = moved.timeline
         self.in_flight += 1
         return Ticket(
-            slot=self.slot,
-            body=self.name,
-            seq=seq,
-            time=time,
-            source=self._terms.source,
-            pose=None if lost or late or "late" in flags else pose,
-            fresh=fresh or moved.fresh,
-            steps=tuple([self._step(instant) for instant in moved.instants]),
-            flags=flags,
-            since=moved.timeline.origin if moved.timeline else time,
-            group=group,
-            checkpoint=self._keep() if keep and self._is_due(time) else None,
+            self.slot,
+            self.name,
+            seq,
+            time,
+            terms.source,
+            None if lost or late or "late" in flags else pose,
+            fresh or moved.fresh,
+            tuple([self._step(instant) for instant in moved.instants]),
+            flags,
+            line.origin if line is not None else time,
+            group,
+            checkpoint=self._keep() if terms.checkpoint_s is not None and keep and self._is_due(time, spread) else None,
         )
 
     def snapshot(self, time: float, group: int | None = None) -> Ticket:
@@ -196,12 +226,18 @@ class Body:
             emotion=UNKNOWN,
         )
 
-    def _is_due(self, time: float) -> bool:
+    def _is_due(self, time: float, spread: Spread | None) -> bool:
         """Whether a checkpoint goes with the frame at `time`: one in every span of `checkpoint_s`."""
         span = self._terms.checkpoint_s
         if span is None or (self._next_checkpoint - span <= time < self._next_checkpoint):
             return False
-        self._next_checkpoint = (math.floor(time / span) + 1) * span
+        if spread is not None and not spread.take():
+            self._put_off = True
+            return False
+        if self._put_off:
+            self._phase, self._put_off = time % span, False
+        spans = math.floor((time - self._phase + SAME_INSTANT_S) / span)
+        self._next_checkpoint = (spans + 1) * span + self._phase
         return True
 
     def conclude(self, ticket: Ticket, outcome: Outcome) -> Estimate:
@@ -248,13 +284,12 @@ class Body:
         return advance(self._timeline, time, rate_hz=self._terms.metadata.rate_hz)
 
     def _step(self, instant: Instant) -> Step:
-        memory, rate = self._terms.memory, self._terms.metadata.rate_hz
         return Step(
-            fraction=instant.fraction,
-            held=instant.held,
-            lanes=plan_row(memory, instant.index, rate),
-            window=window_steps(memory, rate),
-            label=self._label.at(instant.time),
+            instant.fraction,
+            instant.held,
+            self._lanes.row(self._terms.memory, instant.index),
+            self._window,
+            self._label if self._label.until is None else self._label.at(instant.time),
         )
 
     def _next_level(self, intensity: float, time: float) -> LevelState:

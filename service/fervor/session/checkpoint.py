@@ -1,8 +1,8 @@
 """A checkpoint: all that is needed to go on with a body as if nothing had happened, as bytes.
 
-MessagePack, whose floats are float64 as Python's: bookkeeping, the answers to the newest frames, and the engine's arrays
-raw, little-endian. Long ones are deflated; those of a usual session are not, for that would cost a tenth of what a
-second's frames do. Bound to the model file, the protocol and the terms of the session: a state makes no sense under
+MessagePack, whose floats are float64 as Python's: bookkeeping, the answers to the newest frames, and the engine's
+arrays raw, little-endian. Long ones are deflated; those of a usual session are not, for that would cost a tenth of what
+a second's frames do. Bound to the model file, the protocol and the terms of the session: a state makes no sense under
 others. Who may make and read one is not decided here; see `fervor.session.sealing`.
 """
 

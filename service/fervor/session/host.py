@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from fervor.metadata import ModelMetadata
 from fervor.protocol.messages import Limits, ModelInfo
+from fervor.session.spread import Spread
 from fervor.skeletons.skeleton import Skeleton
 
 
@@ -24,3 +25,5 @@ class Host:
     """Opens a token; raises CheckpointUnknown."""
     skeletons: Mapping[str, Skeleton] = field(default_factory=dict)
     """Skeletons beside the catalogue's, by name: calibrations kept on this service."""
+    spread: Spread | None = None
+    """Spreads the checkpoints of all sessions; None on a service of one."""

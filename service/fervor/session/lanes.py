@@ -53,24 +53,23 @@ def schedule(memory: Memory, index: int, rate_hz: float) -> Schedule:
 class LanePlan:
     """All schedules of one rate as arrays, so that steps of many bodies are laid out together: a row a schedule."""
 
+    period: int  # steps
     runs: npt.NDArray[np.bool_]  # [row, lane]
     restart: npt.NDArray[np.bool_]  # [row, lane]
     weight: npt.NDArray[np.float64]  # [row, lane], zero where a lane does not run
 
-
-def plan_row(memory: Memory, index: int, rate_hz: float) -> int:
-    """Where `schedule` of the same step stands in the `lane_plan` of that rate."""
-    if memory == "window":
-        return 0
-    if memory == "stateful":
+    def row(self, memory: Memory, index: int) -> int:
+        """Where `schedule` of step `index` stands."""
+        if memory == "staggered":  # the first period, then so many rows for every later one
+            return 3 + index if index < self.period else 3 + self.period + index % self.period
+        if memory == "window":
+            return 0
         return 1 if index == 0 else 2
-    opening = 2 * _half(rate_hz)  # steps of the first period; so many rows stand for every later one
-    return 3 + index if index < opening else 3 + opening + index % opening
 
 
 @cache
 def lane_plan(rate_hz: float) -> LanePlan:
-    """The schedules of a rate in the order of `plan_row`."""
+    """The schedules of a rate."""
     opening, cycle = _staggered(rate_hz)
     alike = ((), schedule("stateful", 0, rate_hz), _ALONE)
     rows: Sequence[Schedule] = (*alike, *opening, *cycle)
@@ -79,7 +78,7 @@ def lane_plan(rate_hz: float) -> LanePlan:
     for row, lanes in enumerate(rows):
         for step in lanes:
             runs[row, step.lane], restart[row, step.lane], weight[row, step.lane] = True, step.restart, step.weight
-    return LanePlan(runs, restart, weight)
+    return LanePlan(len(cycle), runs, restart, weight)
 
 
 def window_steps(memory: Memory, rate_hz: float) -> int:
@@ -90,17 +89,11 @@ def window_steps(memory: Memory, rate_hz: float) -> int:
 @cache
 def _staggered(rate_hz: float) -> tuple[tuple[Schedule, ...], tuple[Schedule, ...]]:
     """The first period, in which lane 1 is still to come, and every later one."""
-    half = _half(rate_hz)
+    half = max(round(PERIOD_S * rate_hz / 2), 1)  # steps
     fade = min(round(FADE_S * rate_hz), half - 1)
     opening: list[Schedule] = [(LaneStep(0, restart=index == 0, weight=1.0),) for index in range(half)]
     opening += [_pair(index, half, fade) for index in range(half, 2 * half)]
     return tuple(opening), tuple(_pair(index, half, fade) for index in range(2 * half))
-
-
-@cache
-def _half(rate_hz: float) -> int:
-    """Half a period, steps."""
-    return max(round(PERIOD_S * rate_hz / 2), 1)
 
 
 def _pair(index: int, half: int, fade: int) -> Schedule:

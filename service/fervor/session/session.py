@@ -84,6 +84,7 @@ class Session:
         """What kind of joints it gets; None before its start."""
         return None if self._agreement is None else self._agreement.terms.source
 
+    @property
     def agreement(self) -> Agreement | None:
         """What was agreed on; None before the start."""
         return self._agreement
@@ -298,8 +299,10 @@ class Session:
         if body is None:
             body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
         gone = [] if known or self._calibrating is None else self._let_go_of_forgotten(frame.body)
-        keep = not self._is_held(frame.body)
-        ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep)
+        keep, spread = not self._is_held(frame.body), self._host.spread
+        if spread is not None:
+            spread.note()
+        ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep, spread=spread)
         self._tickets[ticket] = (body, place)
         if group is not None:
             self._groups.expect(group)

@@ -70,13 +70,14 @@ def advance(timeline: Timeline | None, time: float, *, rate_hz: float) -> Advanc
     if gap <= 0.0:
         return Advance(timeline, flags=("late",))
     held = gap > INTERPOLATE_S + SAME_INSTANT_S
+    origin, index = timeline.origin, timeline.steps
     instants: list[Instant] = []
-    while (at := timeline.origin + (timeline.steps + len(instants)) / rate_hz) <= time + SAME_INSTANT_S:
+    while (at := origin + index / rate_hz) <= time + SAME_INSTANT_S:
         arrived = at >= time - SAME_INSTANT_S
         fraction = min((at - timeline.last) / gap, 1.0)
-        instants.append(Instant(timeline.steps + len(instants), at, fraction, held and not arrived))
-    moved = Timeline(timeline.origin, time, timeline.steps + len(instants))
-    return Advance(moved, tuple(instants), _describe(instants, held=held))
+        instants.append(Instant(index, at, fraction, held and not arrived))
+        index += 1
+    return Advance(Timeline(origin, time, index), tuple(instants), _describe(instants, held=held))
 
 
 def count_frame(timeline: Timeline | None, time: float) -> Advance:
