@@ -20,8 +20,8 @@ def bench(
     *,
     contestants: Annotated[str, typer.Option(help="Whom to start and measure, by commas.")] = ",".join(CONTESTANTS),
     encoding: Annotated[Encodings, typer.Option(help="Of the messages, for those that know several.")] = "both",
-    sessions: Annotated[str, typer.Option(help="Numbers of sessions to try, by commas.")] = "1,100,300,1000",
-    seconds: Annotated[float, typer.Option(min=0.2, max=600, help="Measured time of each try.")] = 5.0,
+    sessions: Annotated[str, typer.Option(help="Numbers of sessions to try, by commas.")] = "1,100,1000",
+    seconds: Annotated[float, typer.Option(min=0.2, max=600, help="Measured time of each try.")] = 3.0,
     loop: Annotated[Loop, typer.Option(help="`open`: by schedule; `closed`: next message after the answer.")] = "open",
     arrivals: Annotated[
         Arrivals, typer.Option(help="Open loop: schedules at random phases, or all at once.")

@@ -18,11 +18,11 @@ class Plan:
     contestants: tuple[str, ...] = tuple(CONTESTANTS)
     encoding: Encodings = "both"
     traffic: Traffic = field(default_factory=Traffic)
-    sessions: tuple[int, ...] = (1, 100, 300, 1000)
+    sessions: tuple[int, ...] = (1, 100, 1000)
     """Numbers of sessions to try one by one."""
     loop: Loop = "open"
     arrivals: Arrivals = "random"
-    seconds: float = 5.0
+    seconds: float = 3.0
     saturated: int = 64
     """Sessions of the closed loop that fills the contestant's processor."""
     idle: int = 1000

@@ -88,7 +88,7 @@ class Conversation:
         self._unanswered = 0
         self._in_turn = 0  # messages that wait for the end of a turn
         self._waits_for_message = False
-        self._room = asyncio.Event()
+        self._room: asyncio.Future[None] | None = None  # while no more are taken: when some may be
         self._patience = asyncio.timeout(None)
         soonest = min(service.settings.start_timeout_s, service.settings.idle_timeout_s)
         self._watch = self._loop.call_later(soonest, self._look)
@@ -127,8 +127,8 @@ class Conversation:
                 await self._backlog.wait()
             self._act_on(message)
             while self._has_enough:
-                self._room.clear()
-                await self._room.wait()
+                self._room = self._loop.create_future()
+                await self._room
 
     def _take_at_once(self, message: str | bytes) -> bool:
         """Take a message with all of its turn, unless something holds it back: then `_listen` gets it."""
@@ -217,7 +217,7 @@ class Conversation:
     def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
         """See `Taker`."""
         self._in_turn -= 1
-        self._room.set()
+        self._make_room()
         if self._session.state is not SessionState.CLOSED:
             self._act_on(message, raw, poses)
 
@@ -299,12 +299,17 @@ class Conversation:
 
     def _deliver(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
         self._unanswered -= 1
-        self._room.set()
+        self._make_room()
         try:
             self._carry_out(self._session.conclude(ticket, outcome))
             self._leave_when_done()
         except Exception as fault:  # noqa: BLE001  # as above
             self._give_up(fault)
+
+    def _make_room(self) -> None:
+        """Let `_listen` look whether there is room for more."""
+        if self._room is not None and not self._room.done():
+            self._room.set_result(None)
 
     def _give_up(self, fault: Exception) -> None:
         self._log.error("the session failed", exc_info=fault)

@@ -22,7 +22,7 @@ class Outbox:
         self._most_bytes = most_bytes
         self._waiting: OrderedDict[Hashable, str | bytes | Close] = OrderedDict()
         self._bytes = 0
-        self._something = asyncio.Event()
+        self._something: asyncio.Future[None] | None = None  # while nothing waits: when something does
         self._stuck = False
         self._put = 0
         self.bytes_sent = 0
@@ -51,7 +51,8 @@ class Outbox:
             self.superseded += 1
         self._waiting[key] = message
         self._bytes += 0 if isinstance(message, Close) else len(message)
-        self._something.set()
+        if self._something is not None and not self._something.done():
+            self._something.set_result(None)
 
     def drop(self) -> None:
         """Forget what waits."""
@@ -69,8 +70,8 @@ class Outbox:
                         return
                     self._bytes -= len(message)
                     await self._send(message)
-                self._something.clear()
-                await self._something.wait()
+                self._something = asyncio.get_running_loop().create_future()
+                await self._something
         except ConnectionError:
             return
 

@@ -31,7 +31,7 @@ class Roster:
     def __iter__(self) -> Iterator[Body]:
         return iter(self._bodies.values())
 
-    def __contains__(self, name: str) -> bool:
+    def __contains__(self, name: object) -> bool:
         return name in self._bodies
 
     def find(self, name: str, time: float) -> Body | None:

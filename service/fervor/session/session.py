@@ -6,10 +6,9 @@ every `Ticket` to the engine in order and hand each outcome to `conclude`; call 
 
 import math
 from collections.abc import Iterable, Sequence
-from functools import partial
 
 from fervor.emotions import emotion_vector
-from fervor.errors import CheckpointUnknown, CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
+from fervor.errors import CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
@@ -21,7 +20,6 @@ from fervor.protocol.messages import (
     Frames,
     Ping,
     Pong,
-    Resumed,
     SessionCalibrate,
     SessionCalibrated,
     SessionEnd,
@@ -31,14 +29,14 @@ from fervor.protocol.messages import (
     Totals,
 )
 from fervor.protocol.raw_frame import RawFrame, RawFrames
-from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Body
-from fervor.session.calibrating import Calibrating
-from fervor.session.checkpoint import Bond, pack, unpack
-from fervor.session.events import Close, Event, Outcome, Pose, Reply, Restore, Source, Ticket
+from fervor.session.calibrator import Calibrator
+from fervor.session.checkpoint import Bond, pack
+from fervor.session.events import Close, Event, Outcome, Pose, Reply, Source, Ticket
 from fervor.session.groups import Groups
 from fervor.session.host import Host
 from fervor.session.poses import Read
+from fervor.session.resuming import resume
 from fervor.session.roster import Roster
 from fervor.session.start import Agreement, agree
 from fervor.session.state import SessionState, transition
@@ -65,7 +63,7 @@ class Session:
         self._tickets: dict[Ticket, tuple[Body, int]] = {}  # under way → its body, its place in the group
         self._outcomes: dict[Ticket, Outcome | EngineError] = {}  # that wait for those of earlier tickets
         self._groups = Groups()
-        self._calibrating: Calibrating | None = None
+        self._calibrator = Calibrator()
         self._calibrated: dict[Ticket, int] = {}  # last frame of a calibration → the group that tells of it
         self._totals = Totals().model_dump()
 
@@ -167,9 +165,12 @@ class Session:
                 self._totals["resets"] += 1
                 return []
             case BodyEnd():
-                return [self._roster.end(message.body), *self._let_go(message.body)]
+                return [
+                    self._roster.end(message.body),
+                    *self._tell_gone(message.body, self._calibrator.gone(message.body)),
+                ]
             case SessionCalibrate():
-                self._calibrating = Calibrating.begin(message, self._agreed.terms.source)
+                self._calibrator.begin(message, self._agreed.terms.source)
                 return []
             case Ping():
                 return [Reply(Pong(id=message.id))]
@@ -186,7 +187,11 @@ class Session:
             raise ProtocolError(f"the skeleton has {joints} joints; this service takes at most {most}")
         if message.clock == "frames":
             self._roster = Roster(self._host.claim, most=self._host.limits.max_bodies, idle_s=math.inf)
-        resumed, restores = self._resume(message.resume)
+        resumed, restores = (
+            resume(message.resume, self._host, bond=self._bound(), roster=self._roster, terms=self._agreement.terms)
+            if message.resume
+            else ((), [])
+        )
         started = SessionStarted(
             session_id=self.session_id,
             model=self._host.model,
@@ -197,28 +202,6 @@ class Session:
         )
         return [Reply(started), *restores]
 
-    def _resume(self, tokens: Sequence[str]) -> tuple[tuple[Resumed, ...], list[Event]]:
-        """Bodies from checkpoints; all or none.
-
-        Raises:
-            CheckpointUnknown: a token that this service can't take.
-            CheckpointMismatch: a checkpoint of another model or other terms.
-        """
-        if tokens and self._host.unseal is None:
-            raise CheckpointUnknown("this service gives and takes no checkpoints; start without resume")
-        opened = [unpack(self._host.unseal(token), self._bound()) for token in tokens if self._host.unseal]
-        if len({kept.body.name for kept in opened}) != len(opened):
-            raise ProtocolError("resume names a body twice; expected its newest checkpoint only")
-        resumed: list[Resumed] = []
-        restores: list[Event] = []
-        if len(opened) > self._host.limits.max_bodies:
-            raise ProtocolError(f"resume has {len(opened)} bodies; this service takes {self._host.limits.max_bodies}")
-        for kept in opened:
-            body = self._roster.restore(partial(Body.restore, kept.body, kept.answers, terms=self._agreed.terms))
-            restores.append(Restore(body.slot, kept.memory))
-            resumed.append(Resumed(body=body.name, seq=body.newest_seq, same_runtime=kept.same_runtime))
-        return tuple(resumed), restores
-
     def checkpoints(self, group: int | None = None) -> list[Event]:
         """Ask for a checkpoint of every body, after all that is under way and, if any, the answers of `group`.
 
@@ -228,7 +211,7 @@ class Session:
             return []
         tickets: list[Event] = []
         for body in self._roster:
-            if body.last is not None and not self._is_held(body.name):
+            if body.last is not None and not self._calibrator.holds(body.name):
                 ticket = body.snapshot(body.last, group)
                 if group is not None:
                     self._groups.expect(group)
@@ -245,10 +228,6 @@ class Session:
         if self._bond is None:
             self._bond = Bond(self._host.model.sha256, self._host.fingerprint, self._agreed.digest)
         return self._bond
-
-    def _is_held(self, body: str) -> bool:
-        """Whether a body holds its pose for a calibration, of which a checkpoint would know nothing."""
-        return self._calibrating is not None and self._calibrating.request.body == body
 
     def _follow(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> list[Event]:
         """What comes after a ticket's estimate: its checkpoint, and a calibration that ended with it."""
@@ -298,8 +277,8 @@ class Session:
             emotion_vector(frame.emotion)  # before a body is opened for it: a bad frame leaves no trace
         if body is None:
             body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
-        gone = [] if known or self._calibrating is None else self._let_go_of_forgotten(frame.body)
-        keep, spread = not self._is_held(frame.body), self._host.spread
+        gone = [] if known else self._tell_gone(*self._calibrator.replaced(frame.body, self._roster))
+        keep, spread = not self._calibrator.holds(frame.body), self._host.spread
         if spread is not None:
             spread.note()
         ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep, spread=spread)
@@ -307,7 +286,7 @@ class Session:
         if group is not None:
             self._groups.expect(group)
         self._note(ticket)
-        if self._calibrating is None:
+        if not (gone or self._calibrator.active):
             return [ticket]
         return [*gone, ticket, *self._calibrate(ticket, pose)]
 
@@ -343,28 +322,16 @@ class Session:
 
     def _calibrate(self, ticket: Ticket, pose: Pose) -> list[Event]:
         """Hand a frame to the calibration under way; adopt its result, told once this frame is answered."""
-        if self._calibrating is None or ticket.body != self._calibrating.request.body:
-            return []
-        if {"late", "duplicate"} & set(ticket.flags):
-            return []  # neither changes anything
-        name = self._calibrating.request.name
         try:
-            found = self._calibrating.add(ticket.time, pose)
+            found = self._calibrator.add(ticket, pose)
         except InputError as error:
-            self._calibrating = None
-            return [Reply(_error(error).model_copy(update={"body": ticket.body}))]
+            return self._tell_gone(ticket.body, error)
         if found is None:
             return []
-        self._calibrating = None
-        self._agreement, self._bond = self._agreed.aligned(found.skeleton), None
+        calibration, message = found
+        self._agreement, self._bond = self._agreed.aligned(calibration.skeleton), None
         for known in self._roster:
             known.adopt(self._agreement.terms)
-        message = SessionCalibrated(
-            skeleton=SkeletonSpec.of(found.skeleton, name=name),
-            frames=found.frames,
-            spread_deg=found.spread_deg,
-            unseen=found.unseen,
-        )
         return self._tell_calibrated(ticket, message)
 
     def _tell_calibrated(self, ticket: Ticket, message: SessionCalibrated) -> list[Event]:
@@ -379,20 +346,9 @@ class Session:
         self._calibrated[ticket] = group
         return self.checkpoints(group)
 
-    def _let_go(self, body: str) -> list[Event]:
-        """A body is gone, and with it the calibration that its pose was held for; one that waits for it goes on to."""
-        if self._calibrating is None or not self._calibrating.begun or not self._is_held(body):
-            return []
-        self._calibrating = None
-        error = InputError(f"body {body!r} was gone before its pose was held long enough; nothing changed")
-        return [Reply(_error(error).model_copy(update={"body": body}))]
-
-    def _let_go_of_forgotten(self, newcomer: str) -> list[Event]:
-        """A newcomer takes the place of bodies that were idle, its own former self among them."""
-        if self._calibrating is None:
-            return []
-        held = self._calibrating.request.body
-        return self._let_go(held) if held == newcomer or held not in self._roster else []
+    def _tell_gone(self, body: str, error: InputError | None) -> list[Event]:
+        """A calibration is over without a result, if there is an error that says so."""
+        return [] if error is None else [Reply(_error(error).model_copy(update={"body": body}))]
 
     def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
         if not ticket.answer:
