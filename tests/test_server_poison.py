@@ -2,14 +2,15 @@
 
 import asyncio
 import json
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from bodies import motion
-from fervor.protocol.messages import ClientMessage
 from fervor.session.events import Event
-from fervor.session.session import Session
+from fervor.session.poses import Read
+from fervor.session.session import Incoming, Session
 from live import Live, RawClient, frames_of, talk
 
 HEALTHY = frames_of(motion(60, seed=5))
@@ -139,9 +140,9 @@ async def test_a_fault_of_ours_ends_one_session_only(
         await healthy.start(emotion="joy")
         good = Session.receive
 
-        def fails_on_an_end(self: Session, message: ClientMessage) -> list[Event]:
+        def fails_on_an_end(self: Session, message: Incoming, poses: Sequence[Read] = ()) -> list[Event]:
             assert message.type != "body.end"
-            return good(self, message)
+            return good(self, message, poses)
 
         monkeypatch.setattr(Session, "receive", fails_on_an_end)
         await sick.follow(HEALTHY[:1])

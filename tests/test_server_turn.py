@@ -139,3 +139,17 @@ async def test_a_poisoned_frame_costs_its_neighbours_nothing(batcher: Batcher) -
     assert talks[0].estimates() == talks[2].estimates() != []
     assert talks[1].estimates() == []
     assert talks[1].said[-1].code == "bad_frame"
+
+
+async def test_a_fault_in_reading_together_costs_nobody_a_frame(batcher: Batcher, monkeypatch, caplog) -> None:
+    def fails(_: object) -> list[Read]:
+        raise ValueError("ours")
+
+    monkeypatch.setattr("fervor.server.turn.read_poses", fails)
+    turn, talks = Turn(batcher), [Talk(batcher) for _ in range(3)]
+    for talk in talks:
+        turn.put(talk, start())
+        turn.put(talk, frames(0, 1)[0])
+    await settle(batcher, turn)
+    assert [len(talk.estimates()) for talk in talks] == [1, 1, 1]
+    assert "could not be read together" in caplog.text

@@ -5,13 +5,17 @@ run by the engine. Nobody waits for company: the turn is taken as soon as the lo
 """
 
 import asyncio
+import logging
 from collections.abc import Sequence
+from itertools import islice
 from typing import NamedTuple, Protocol
 
 from fervor.engine.batcher import Batcher
 from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.session.poses import Read, read_poses
 from fervor.session.start import Agreement
+
+log = logging.getLogger(__name__)
 
 
 class Taker(Protocol):
@@ -48,26 +52,41 @@ class Turn:
 
     def _take(self) -> None:
         came, self._came = self._came, []
-        decoded = [_decode(taker, message) for taker, message in came]
-        poses = read_poses([(each.agreement, frame) for each in decoded for frame in each.frames if each.agreement])
-        at = 0
-        for each in decoded:
-            stop = at + (len(each.frames) if each.agreement else 0)
-            each.taker.take(each.message, each.raw, poses[at:stop])
-            at = stop
+        try:
+            together = _read(came)
+        except Exception:  # a fault of ours must cost nobody a message: then every session reads by itself
+            log.exception("the frames of a turn could not be read together")
+            together = [_Ready(taker, message, None, ()) for taker, message in came]
+        for taker, message, raw, poses in together:
+            taker.take(message, raw, poses)
         self._batcher.run()
 
 
-class _Decoded(NamedTuple):
+class _Ready(NamedTuple):
     taker: Taker
     message: str | bytes
     raw: RawFrame | RawFrames | None
-    frames: tuple[RawFrame, ...]
-    agreement: Agreement | None
-    """As it was before the turn: frames behind a `session.start` in the same turn are read by their session."""
+    poses: Sequence[Read]
 
 
-def _decode(taker: Taker, message: str | bytes) -> _Decoded:
-    raw = taker.decode_raw(message)
-    frames = () if raw is None else (raw,) if isinstance(raw, RawFrame) else raw.frames
-    return _Decoded(taker, message, raw, frames, taker.agreement)
+def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
+    """Decode messages, and read the poses of raw frames together.
+
+    Frames behind a `session.start` in the same turn have no agreement yet; their session reads them.
+    """
+    decoded = [(taker, message, taker.decode_raw(message), taker.agreement) for taker, message in came]
+    frames = [
+        (agreement, frame)
+        for _, _, raw, agreement in decoded
+        if raw is not None and agreement is not None
+        for frame in _frames_of(raw)
+    ]
+    poses = iter(read_poses(frames))
+    return [
+        _Ready(taker, message, raw, list(islice(poses, len(_frames_of(raw)))) if raw and agreement else ())
+        for taker, message, raw, agreement in decoded
+    ]
+
+
+def _frames_of(raw: RawFrame | RawFrames) -> tuple[RawFrame, ...]:
+    return (raw,) if isinstance(raw, RawFrame) else raw.frames
