@@ -70,15 +70,15 @@ class Answers:
         """A frame is answered; in the order in which they came."""
         seq, shares = estimate.seq, estimate.by_emotion
         self._conclude(seq)
-        self._given[seq] = _encode(
-            _Kept(
+        self._given[seq] = _encode(  # the fields of `_Kept`, in their order
+            (
                 seq,
                 estimate.t,
                 estimate.intensity,
                 estimate.level,
                 estimate.emotion,
-                estimate.status,  # type: ignore[arg-type]  # a session gives no other; as flags
-                estimate.flags,  # type: ignore[arg-type]
+                estimate.status,
+                estimate.flags,
                 None if shares is None else tuple(shares.values()),
             )
         )
