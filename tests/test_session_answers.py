@@ -1,7 +1,7 @@
 """A frame that comes twice gets one answer, also from another service."""
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fervor.emotions import EMOTIONS
@@ -37,6 +37,7 @@ def lives(draw):
     return told
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])  # a hundred estimates take a second to make on a busy machine
 @given(lives())
 def test_what_is_kept_survives_the_way_through_bytes_to_the_bit(told):
     answers = Answers("eve")
