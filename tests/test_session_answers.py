@@ -45,6 +45,7 @@ def test_what_is_kept_survives_the_way_through_bytes_to_the_bit(told):
         answers.expect(estimate.seq)
         answers.give(estimate)
     again = Answers.from_bytes("eve", answers.to_bytes())
+    assert (again.newest, again.any) == (told[-1] if told else None, bool(told))
     for place, estimate in enumerate(told):
         kept = estimate if place >= len(told) - REMEMBERED else None
         assert answers.find(estimate.seq) == again.find(estimate.seq) == kept

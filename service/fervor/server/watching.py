@@ -66,7 +66,7 @@ def _metres(offset: Offset) -> Point:
 def take_snapshot(service: Service, look: Look) -> Snapshot:
     """What there is to see now. `look` past the end shows the last bodies."""
     sessions = [conversation.session for conversation in service.drain.talking]
-    answered = [(session, body) for session in sessions for body in session.bodies if body.newest is not None]
+    answered = [(session, body) for session in sessions for body in session.bodies if body.begun]
     first = min(look.first, max(len(answered) - 1, 0) // MOST_SHOWN * MOST_SHOWN)
     shown = answered[first : first + MOST_SHOWN]
     thresholds = service.host.model.thresholds

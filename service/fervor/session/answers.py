@@ -58,9 +58,15 @@ class Answers:
         return False
 
     @property
+    def any(self) -> bool:
+        """Whether anything was answered."""
+        return bool(self._given)
+
+    @property
     def newest(self) -> Estimate | None:
         """What was answered last; None before the first answer."""
-        return next(reversed(self._given.values()), None)
+        kept = next(reversed(self._given.values()), None)
+        return None if kept is None else self._estimate(_decode(kept))
 
     def find(self, seq: int) -> Estimate | None:
         """The answer that a frame of this number got; None if it is under way, forgotten or never came."""

@@ -94,8 +94,13 @@ class Body:
         return self._last
 
     @property
+    def begun(self) -> bool:
+        """Whether it has an answer: while the engine has run nothing for it, its slot may hold another's pose."""
+        return self._answers.any
+
+    @property
     def newest(self) -> Estimate | None:
-        """Its newest estimate; None while the engine has run nothing for it, and its slot may hold another's pose."""
+        """Its newest estimate; None before the first."""
         return self._answers.newest
 
     def reset(self, flag: Flag = "reset") -> None:
