@@ -21,7 +21,8 @@ from fervor.emotions import EMOTIONS
 from fervor.model import Model, default_model_path
 from fervor.recordings.reader import read_recording
 from fervor.recordings.recording import rig_poses
-from fervor.scoring import Scorer, Take
+from fervor.scoring.scorer import Scorer
+from fervor.scoring.take import Take
 from fervor.session.body import Terms
 from fervor.session.events import Source
 from fervor.skeletons.canonical import C13
@@ -70,10 +71,7 @@ class Scoring:
             for motion, poses in zip(motions, sent, strict=True)
         ]
         scored = self._scorer.score(takes, Terms(self.model.metadata, Source(source, axes), by_emotion=True))
-        return [
-            np.array([list(estimate.by_emotion.values()) for estimate in estimates])[motion.times >= WARM_UP_S]
-            for motion, estimates in zip(motions, scored, strict=True)
-        ]
+        return [each.by_emotion[motion.times >= WARM_UP_S] for motion, each in zip(motions, scored, strict=True)]
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fervor.levels import Level, LevelState, next_level
+from fervor.levels import Level, LevelState, levels_over_time, next_level
 
 RULE = {"threshold": 0.5, "hysteresis": 0.05, "dwell": 1.0}
 
@@ -46,6 +46,20 @@ def test_changes_are_never_closer_than_the_dwell(values):
             changes.append(index / 30)
         state = following
     assert all(b - a >= RULE["dwell"] - 1e-9 for a, b in itertools.pairwise(changes))
+
+
+EDGES = st.sampled_from([0.0, 0.44, 0.45, 0.5 - 0.05, 0.5, 0.55, 0.5 + 0.05, 0.56, 1.0])
+
+
+@given(st.lists(st.tuples(EDGES | st.floats(0, 1), st.sampled_from([0.0, 0.1, 0.5, 1.0])), max_size=100))
+def test_over_time_is_one_after_the_other(values):
+    intensities = [intensity for intensity, _ in values]
+    times = list(itertools.accumulate(gap for _, gap in values))
+    state, levels = None, []
+    for intensity, time in zip(intensities, times, strict=True):
+        state = next_level(state, intensity=intensity, time=time, **RULE)
+        levels.append(state.level)
+    assert levels_over_time(intensities, times, **RULE) == levels
 
 
 def test_level_values_are_the_wire_words():

@@ -2,9 +2,10 @@
 
 import itertools
 
+import numpy as np
 import pytest
 
-from fervor.session.lanes import FADE_S, LANES, PERIOD_S, lane_plan, schedule
+from fervor.session.lanes import FADE_S, LANES, PERIOD_S, lane_plan, lane_runs, lane_weights, schedule
 
 RATE = 30.0
 
@@ -62,3 +63,24 @@ def test_the_plan_says_of_every_step_what_its_schedule_says(memory, rate):
             step = lanes.get(lane)
             planned = (plan.runs[row, lane], plan.restart[row, lane], plan.weight[row, lane])
             assert planned == ((False, False, 0.0) if step is None else (True, step.restart, step.weight))
+
+
+@pytest.mark.parametrize("memory", ["staggered", "stateful"])
+@pytest.mark.parametrize("steps", [0, 1, 119, 120, 226, 240, 241, 700, 1000])
+def test_lanes_over_time_are_the_schedule(memory, steps):
+    weights = np.zeros((steps, 2))
+    for index in range(steps):
+        for lane in schedule(memory, index, RATE):
+            weights[index, lane.lane] = lane.weight
+    assert (lane_weights(memory, steps, RATE) == weights).all()
+    heard = np.zeros((steps, 2), np.bool_)
+    for run in lane_runs(memory, steps, RATE):
+        assert any(lane.lane == run.lane and lane.restart for lane in schedule(memory, run.start, RATE))
+        assert all(
+            not lane.restart or lane.lane != run.lane
+            for index in range(run.start + 1, run.stop)
+            for lane in schedule(memory, index, RATE)
+        )
+        assert not heard[run.start : run.stop, run.lane].any()
+        heard[run.start : run.stop, run.lane] = True
+    assert heard[weights > 0].all()

@@ -1,5 +1,6 @@
 """Intensity to level: a threshold per emotion with hysteresis and dwell, a pure function of intensities and times."""
 
+from collections.abc import Iterable
 from enum import StrEnum
 
 import msgspec
@@ -42,3 +43,19 @@ def next_level(
     if state.level is Level.STRONG and intensity < threshold - hysteresis:
         return LevelState(Level.WEAK, time)
     return state
+
+
+def levels_over_time(
+    intensities: Iterable[float], times: Iterable[float], *, threshold: float, hysteresis: float, dwell: float
+) -> list[Level]:
+    """The level after each of many intensities, the first of which is the first estimate: `next_level` repeated."""
+    levels: list[Level] = []
+    level, since = None, 0.0
+    up, down = threshold + hysteresis, threshold - hysteresis
+    for intensity, time in zip(intensities, times, strict=True):
+        if level is None:
+            level, since = (Level.STRONG if intensity >= threshold else Level.WEAK), time
+        elif time - since >= dwell and (intensity >= up if level is Level.WEAK else intensity < down):
+            level, since = (Level.STRONG if level is Level.WEAK else Level.WEAK), time
+        levels.append(level)
+    return levels

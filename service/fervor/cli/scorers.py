@@ -14,9 +14,9 @@ from fervor.errors import AuthError, FervorError, InputError, Overloaded, Reques
 from fervor.model import Model, check_row_independence, default_model_path
 from fervor.protocol.messages import ModelInfo
 from fervor.recordings.source import read_content
-from fervor.scoring import Scorer
+from fervor.scoring.scorer import Scorer
 from fervor.server.model_info import model_info
-from fervor.server.recordings import score_recording
+from fervor.server.recordings import score_recordings
 from fervor.server.scoring_models import FileOptions, ScoreResponse, SequenceScore
 
 PATIENCE_S = 600.0
@@ -42,7 +42,7 @@ class Here:
             InputError: the file or the emotion can't be used.
         """
         recording = read(file, skeleton=self._options.skeleton)
-        scored = score_recording(self._scorer, self._metadata, recording, self._options)
+        (scored,) = score_recordings(self._scorer, self._metadata, [recording], self._options)
         return scored.model_copy(update={"name": str(file)})
 
 

@@ -21,9 +21,10 @@ from fervor.protocol.messages import Frame, SessionStart
 from fervor.recordings.reader import read_recording
 from fervor.recordings.recording import Recording
 from fervor.recordings.table_jsonl import jsonl_of
-from fervor.scoring import Scorer, Take
+from fervor.scoring.scorer import Scorer
+from fervor.scoring.take import Take
 from fervor.server.model_info import model_info
-from fervor.server.recordings import score_recording
+from fervor.server.recordings import score_recordings
 from fervor.server.scoring_models import (
     MULTIPART,
     FileOptions,
@@ -81,10 +82,7 @@ class ScoringJobs:
         takes = [_take(number, sequence, agreement) for number, sequence in enumerate(request.sequences)]
         terms = replace(agreement.terms, emotion_ttl_s=math.inf)
         scored = self._scorer.score(takes, terms)
-        return self._answer(
-            SequenceScore.of(take.name, estimates, request.detail)
-            for take, estimates in zip(takes, scored, strict=True)
-        )
+        return self._answer(SequenceScore.of(each, request.detail) for each in scored)
 
     def score_files(self, body: bytes, content_type: str, query: Mapping[str, object]) -> bytes:
         """Score uploaded recordings: a form with files, or a body that is a file.
@@ -106,7 +104,7 @@ class ScoringJobs:
         recordings = [_read_recording(upload, options.skeleton) for upload in uploads]
         self._check(len(uploads), sum(map(len, recordings)))
         metadata = self._model.metadata
-        return self._answer(score_recording(self._scorer, metadata, recording, options) for recording in recordings)
+        return self._answer(score_recordings(self._scorer, metadata, recordings, options))
 
     def convert_file(self, body: bytes, filename: str, skeleton: str | None) -> bytes:
         """A recording on the rig, as JSON lines.

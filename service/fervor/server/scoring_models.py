@@ -4,7 +4,6 @@ The words are those of the stream: a sequence is a body, its frames are `frame` 
 fields are refused, so that a misspelt option is told and not ignored.
 """
 
-from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from fervor.levels import Level
 from fervor.protocol.messages import Clock, Emotion, Estimate, Joints, Mask, Memory, ModelInfo, Quaternions, Vectors
 from fervor.protocol.skeleton_spec import SkeletonSpec
-from fervor.scoring import summarise
+from fervor.scoring.scored import Scored, summarise
 from fervor.skeletons.skeleton import Axes, QuaternionOrder
 
 Detail = Literal["summary", "frames"]
@@ -110,18 +109,18 @@ class SequenceScore(_Strict):
     estimates: tuple[Estimate, ...] | None = Field(None, description="with detail `frames`: one a frame")
 
     @classmethod
-    def of(cls, name: str, estimates: Sequence[Estimate], detail: Detail) -> "SequenceScore":
-        """The score of the sequence `name` from all its estimates."""
-        summary = summarise(name, estimates)
+    def of(cls, scored: Scored, detail: Detail) -> "SequenceScore":
+        """The score of a sequence from all its estimates."""
+        summary = summarise(scored)
         return cls(
-            name=name,
+            name=summary.name,
             emotion=summary.emotion,
             frames=summary.frames,
             duration_s=summary.duration_s,
             intensity=IntensitySummary(mean=summary.mean, peak=summary.peak, last=summary.last),
             strong=summary.strong,
             level=summary.level,
-            estimates=tuple(estimates) if detail == "frames" else None,
+            estimates=tuple(scored.estimates()) if detail == "frames" else None,
         )
 
 

@@ -86,7 +86,7 @@ class Body:
         self._phase = 0.0  # seconds after the beginning of a span
         self._put_off = False
         self._answers = Answers(name)
-        self._enough = _enough(terms)
+        self._enough = enough_joints(terms)
 
     @property
     def last(self) -> float | None:
@@ -111,7 +111,7 @@ class Body:
     def adopt(self, terms: Terms) -> None:
         """Go on under new terms, from a reset."""
         self._terms = terms
-        self._enough = _enough(terms)
+        self._enough = enough_joints(terms)
         self.reset()
         self._next_checkpoint = -math.inf  # those before are of terms that no longer hold
 
@@ -323,7 +323,7 @@ def _again(estimate: Estimate | None) -> Estimate | None:
     return estimate and estimate.model_copy(update={"flags": (*estimate.flags, "duplicate")})
 
 
-def _enough(terms: Terms) -> float:
+def enough_joints(terms: Terms) -> float:
     """Upper-body joints that a frame must show."""
     seen = terms.source.skeleton.sees
     return ENOUGH_JOINTS * sum(seen[joint] for joint in UPPER_BODY)

@@ -102,3 +102,54 @@ def _pair(index: int, half: int, fade: int) -> Schedule:
     younger_share = max(fade + 1 - until_restart, 0) / (fade + 1)
     weights = (1.0 - younger_share, younger_share) if elder == 0 else (younger_share, 1.0 - younger_share)
     return (LaneStep(0, index == 0, weights[0]), LaneStep(1, index == half, weights[1]))
+
+
+@dataclass(frozen=True, slots=True)
+class LaneRun:
+    """What one lane does between two restarts, as far as it is heard."""
+
+    lane: int
+    start: int
+    """The step that restarts it."""
+    stop: int
+    """The step after the last one in which it has a share of the estimate."""
+
+
+def lane_weights(memory: Memory, steps: int, rate_hz: float) -> npt.NDArray[np.float64]:
+    """The share of each lane in the first `steps` after a reset, [step, lane]; what `schedule` says step by step."""
+    weights = np.zeros((steps, LANES))
+    if memory == "stateful":
+        weights[:, 0] = 1.0
+    else:
+        opening, cycle = _staggered_weights(rate_hz)
+        repeats = max(-(-(steps - len(opening)) // len(cycle)), 0)
+        weights[:] = np.concatenate([opening, *[cycle] * repeats])[:steps]
+    return weights
+
+
+def lane_runs(memory: Memory, steps: int, rate_hz: float) -> list[LaneRun]:
+    """What the lanes do in the first `steps` after a reset; a lane that is not heard any more need not run."""
+    if memory == "stateful":
+        return [LaneRun(0, 0, steps)]
+    period = len(_staggered(rate_hz)[1])
+    weights = lane_weights(memory, steps, rate_hz)
+    runs = []
+    for lane in range(LANES):
+        for start in range(lane * period // LANES, steps, period):
+            heard = np.flatnonzero(weights[start : start + period, lane])
+            if len(heard):
+                runs.append(LaneRun(lane, start, start + int(heard[-1]) + 1))
+    return runs
+
+
+@cache
+def _staggered_weights(rate_hz: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """The shares [step, lane] of the first period, and of every later one."""
+    tables = []
+    for schedules in _staggered(rate_hz):
+        table = np.zeros((len(schedules), LANES))
+        for index, lanes in enumerate(schedules):
+            for lane in lanes:
+                table[index, lane.lane] = lane.weight
+        tables.append(table)
+    return tables[0], tables[1]

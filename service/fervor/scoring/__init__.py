@@ -1,0 +1,1 @@
+"""Whole recordings: the estimates a stream of the same frames would get, to the bit."""
