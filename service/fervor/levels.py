@@ -1,9 +1,8 @@
 """Intensity to level: a threshold per emotion with hysteresis and dwell, a pure function of intensities and times."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import StrEnum
-
-import msgspec
 
 
 class Level(StrEnum):
@@ -13,7 +12,8 @@ class Level(StrEnum):
     STRONG = "strong"
 
 
-class LevelState(msgspec.Struct, frozen=True, gc=False):
+@dataclass(frozen=True, slots=True)
+class LevelState:
     """The level of one body, and since when."""
 
     level: Level
@@ -48,7 +48,7 @@ def next_level(
 def levels_over_time(
     intensities: Iterable[float], times: Iterable[float], *, threshold: float, hysteresis: float, dwell: float
 ) -> list[Level]:
-    """The level after each of many intensities, the first of which is the first estimate: `next_level` repeated."""
+    """The level after each of many intensities, of which the first is the first estimate; the same as `next_level`."""
     levels: list[Level] = []
     level, since = None, 0.0
     up, down = threshold + hysteresis, threshold - hysteresis

@@ -51,7 +51,7 @@ FILE_BODY: dict[str, Any] = {
 async def score(request: Request, service: Annotated[Service, Depends(service_of)]) -> Response:
     """Score one or many sequences of frames: a summary of each or, with `detail: frames`, every estimate."""
     body = await read_body(request, service.settings.score_max_bytes)
-    return _json(await service.scoring.run("score", body))
+    return _json(await service.scoring.run("score", body, request.headers.get("content-type", "")))
 
 
 @router.post("/score/file", response_model=ScoreResponse, responses=PROBLEMS, openapi_extra=FILE_BODY)

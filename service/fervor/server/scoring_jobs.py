@@ -8,33 +8,30 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
 from pydantic import ValidationError
 from python_multipart import parse_form
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import Field, File
 
-from fervor.errors import FrameError, RequestError, TooLarge
+from fervor.errors import RequestError, TooLarge
 from fervor.model import Model
 from fervor.protocol.codec import one_sentence
-from fervor.protocol.messages import Frame, SessionStart
+from fervor.protocol.messages import SessionStart
 from fervor.recordings.reader import read_recording
 from fervor.recordings.recording import Recording
 from fervor.recordings.table_jsonl import jsonl_of
 from fervor.scoring.scorer import Scorer
-from fervor.scoring.take import Take
 from fervor.server.model_info import model_info
 from fervor.server.recordings import score_recordings
 from fervor.server.scoring_models import (
     MULTIPART,
     FileOptions,
-    ScoreRequest,
     ScoreResponse,
-    ScoreSequence,
     SequenceScore,
 )
 from fervor.server.scoring_process import Allowed
-from fervor.session.start import Agreement, agree
+from fervor.server.scoring_requests import read_request, take_of
+from fervor.session.start import agree
 from fervor.skeletons.skeleton import Skeleton
 
 
@@ -65,24 +62,21 @@ class ScoringJobs:
         self._skeletons = skeletons
         self._scorer = Scorer(model, row_multiple=row_multiple)
 
-    def score(self, body: bytes) -> bytes:
-        """Score the sequences of a JSON request.
+    def score(self, body: bytes, content_type: str) -> bytes:
+        """Score the sequences of a request in JSON or MessagePack.
 
         Raises:
             InputError: something in the request can't be used; says where.
             TooLarge: more frames or sequences than allowed.
         """
-        try:
-            request = ScoreRequest.model_validate_json(body, strict=True)
-        except ValidationError as error:
-            raise RequestError(one_sentence(error)) from None
-        self._check(len(request.sequences), sum(len(sequence.frames) for sequence in request.sequences))
-        terms_asked = SessionStart(**request.model_dump(exclude={"sequences", "detail"}))
+        asked = read_request(body, content_type)
+        self._check(len(asked.sequences), asked.frames)
+        terms_asked = SessionStart(**asked.terms.model_dump(exclude={"sequences", "detail"}))
         agreement = agree(terms_asked, self._model.metadata, self._skeletons)
-        takes = [_take(number, sequence, agreement) for number, sequence in enumerate(request.sequences)]
+        takes = [take_of(number, sequence, agreement) for number, sequence in enumerate(asked.sequences)]
         terms = replace(agreement.terms, emotion_ttl_s=math.inf)
         scored = self._scorer.score(takes, terms)
-        return self._answer(SequenceScore.of(each, request.detail) for each in scored)
+        return self._answer(SequenceScore.of(each, asked.terms.detail) for each in scored)
 
     def score_files(self, body: bytes, content_type: str, query: Mapping[str, object]) -> bytes:
         """Score uploaded recordings: a form with files, or a body that is a file.
@@ -151,22 +145,6 @@ class ScoringJobs:
         ):
             if count > most:
                 raise TooLarge(f"the request has {count} {what}; this service takes at most {most} in one request")
-
-
-def _take(number: int, sequence: ScoreSequence, agreement: Agreement) -> Take:
-    """The frames of a sequence as arrays, through the gate that live frames pass."""
-    name = sequence.name or f"sequence {number}"
-    times, joints, observed = [], [], []
-    for seq, sent in enumerate(sequence.frames):
-        frame = Frame.model_construct(body=name, seq=seq, t=sent.t, q=sent.q, p=sent.p, mask=sent.mask)
-        try:
-            times.append(agreement.time_of(frame))
-            pose = agreement.pose_of(frame)
-        except FrameError as error:
-            raise RequestError(error.message) from None
-        joints.append(pose.joints)
-        observed.append(pose.observed)
-    return Take(name, np.array(times), np.stack(joints), np.stack(observed), sequence.emotion)
 
 
 def _read_recording(upload: Upload, skeleton: str | None) -> Recording:

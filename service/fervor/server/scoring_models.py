@@ -9,7 +9,18 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from fervor.levels import Level
-from fervor.protocol.messages import Clock, Emotion, Estimate, Joints, Mask, Memory, ModelInfo, Quaternions, Vectors
+from fervor.protocol.messages import (
+    Clock,
+    Emotion,
+    Estimate,
+    Joints,
+    Mask,
+    Memory,
+    ModelInfo,
+    Quaternions,
+    Raw,
+    Vectors,
+)
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.scoring.scored import Scored, summarise
 from fervor.skeletons.skeleton import Axes, QuaternionOrder
@@ -47,11 +58,14 @@ class ScoreFrame(_Strict):
     mask: Mask | None = Field(None, description="false where untracked")
 
 
-class ScoreSequence(_Strict):
-    """One take of one body."""
-
+class _Sequence(_Strict):
     name: str = Field("", max_length=256)
     emotion: Emotion | None = Field(None, description="holds for the whole sequence; absent: unknown")
+
+
+class ScoreSequence(_Sequence):
+    """One take of one body."""
+
     frames: tuple[ScoreFrame, ...] = Field(min_length=1, fail_fast=True)
 
 
@@ -64,17 +78,43 @@ class Manner(_Strict):
     detail: Detail = Field("summary", description="`frames`: all estimates too")
 
 
-class ScoreRequest(Manner):
-    """One or many sequences of frames of one kind of sensor."""
+class PackedScoreFrame(_Strict):
+    """A frame in MessagePack: joints may be raw, as on the stream."""
 
-    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE})
+    t: float | None = Field(None, allow_inf_nan=False)
+    q: Quaternions | Raw | None = None
+    p: Vectors | Raw | None = None
+    mask: Mask | None = None
+
+
+class PackedScoreSequence(_Sequence):
+    """A sequence in MessagePack."""
+
+    frames: tuple[PackedScoreFrame, ...] = Field(min_length=1, fail_fast=True)
+
+
+class ScoreTerms(Manner):
+    """What holds for all sequences of a request."""
 
     skeleton: str | SkeletonSpec = Field("c13", description="name from /v1/skeletons, or one of your own")
     axes: Axes | None = Field(None, description="default: what the skeleton's sensor gives")
     quaternion: QuaternionOrder | None = Field(None, description="default: what the skeleton's sensor gives")
     joints: Joints | None = Field(None, description="joints sent, in this order; others count as untracked")
     nominal_hz: float | None = Field(None, gt=0, le=1000, description="the sensor's rate; used by clock `frames`")
+
+
+class ScoreRequest(ScoreTerms):
+    """One or many sequences of frames of one kind of sensor."""
+
+    model_config = ConfigDict(json_schema_extra={"example": EXAMPLE})
+
     sequences: tuple[ScoreSequence, ...] = Field(min_length=1, fail_fast=True)
+
+
+class PackedScoreRequest(ScoreTerms):
+    """A request in MessagePack."""
+
+    sequences: tuple[PackedScoreSequence, ...] = Field(min_length=1, fail_fast=True)
 
 
 class FileOptions(Manner):

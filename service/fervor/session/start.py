@@ -110,12 +110,19 @@ class Agreement:
             joints, observed = frame_points(frame, self.joints)
         else:
             joints, observed = frame_pose(frame, self.joints, self.order)
+        return Pose(*self.arranged(joints, observed))
+
+    def arranged(
+        self, joints: npt.NDArray[np.float64], observed: npt.NDArray[np.bool_]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+        """Joints as they were sent, [..., joint, k] and [..., joint], in the order of the source."""
         if self.places is None:
-            return Pose(joints, observed)
+            return joints, observed
         count = len(self.terms.source.skeleton.joints)
-        arranged, seen = np.zeros((count, joints.shape[1])), np.zeros(count, np.bool_)
-        arranged[self.places], seen[self.places] = joints, observed
-        return Pose(arranged, seen)
+        arranged = np.zeros((*joints.shape[:-2], count, joints.shape[-1]))
+        seen = np.zeros(arranged.shape[:-1], np.bool_)
+        arranged[..., self.places, :], seen[..., self.places] = joints, observed
+        return arranged, seen
 
     def aligned(self, skeleton: Skeleton) -> "Agreement":
         """The same agreement for the same sensor under another alignment."""

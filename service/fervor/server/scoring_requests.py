@@ -1,0 +1,199 @@
+"""The bodies of `/v1/score`, JSON or MessagePack: what they ask for, and the takes that they bring.
+
+msgspec reads the frames straight into the types they must have. What it does not take, pydantic decodes, or refuses
+with a sentence; so one place alone says what is wrong.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Annotated, Any
+
+import msgpack
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+from pydantic import ValidationError
+
+from fervor.errors import FrameError, RequestError
+from fervor.protocol.codec import one_sentence
+from fervor.protocol.messages import MOST_LABELS, Frame, Raw
+from fervor.protocol.pose_blocks import Sent, pose_block
+from fervor.protocol.skeleton_spec import MOST_JOINTS
+from fervor.protocol.trusted import trusted
+from fervor.scoring.take import Take
+from fervor.server.scoring_models import (
+    PackedScoreFrame,
+    PackedScoreRequest,
+    PackedScoreSequence,
+    ScoreFrame,
+    ScoreRequest,
+    ScoreSequence,
+    ScoreTerms,
+)
+from fervor.session.start import Agreement
+from fervor.skeletons.landmarks import Landmarks
+
+MSGPACK = ("application/msgpack", "application/vnd.msgpack", "application/x-msgpack")
+"""Content types of MessagePack; the first one is what we call it."""
+
+# The types of fervor.server.scoring_models once more, as msgspec says them; a test compares the two.
+
+_Label = Annotated[str, Meta(max_length=32)]
+_Emotion = _Label | Annotated[dict[_Label, float], Meta(max_length=MOST_LABELS)]
+_Quaternions = Annotated[tuple[tuple[float, float, float, float] | None, ...], Meta(max_length=MOST_JOINTS)]
+_Vectors = Annotated[tuple[tuple[float, float, float] | None, ...], Meta(max_length=MOST_JOINTS)]
+_Mask = Annotated[tuple[bool, ...], Meta(max_length=MOST_JOINTS)]
+
+
+class _JsonFrame(Struct, forbid_unknown_fields=True, gc=False):
+    t: float | None = None
+    q: _Quaternions | None = None
+    p: _Vectors | None = None
+    mask: _Mask | None = None
+
+
+class _PackedFrame(Struct, forbid_unknown_fields=True, gc=False):
+    t: float | None = None
+    q: bytes | _Quaternions | None = None
+    p: bytes | _Vectors | None = None
+    mask: _Mask | None = None
+
+
+class _JsonSequence(Struct, forbid_unknown_fields=True):
+    frames: Annotated[tuple[_JsonFrame, ...], Meta(min_length=1)]
+    name: Annotated[str, Meta(max_length=256)] = ""
+    emotion: _Emotion | None = None
+
+
+class _PackedSequence(Struct, forbid_unknown_fields=True):
+    frames: Annotated[tuple[_PackedFrame, ...], Meta(min_length=1)]
+    name: Annotated[str, Meta(max_length=256)] = ""
+    emotion: _Emotion | None = None
+
+
+AskedFrame = ScoreFrame | PackedScoreFrame | _JsonFrame | _PackedFrame
+AskedSequence = ScoreSequence | PackedScoreSequence | _JsonSequence | _PackedSequence
+
+_Parts = dict[str, msgspec.Raw]
+
+_json_parts: Callable[[bytes], _Parts] = msgspec.json.Decoder(_Parts).decode
+_json_sequences: Callable[[msgspec.Raw], tuple[_JsonSequence, ...]] = msgspec.json.Decoder(
+    Annotated[tuple[_JsonSequence, ...], Meta(min_length=1)]
+).decode
+_packed_parts: Callable[[bytes], _Parts] = msgspec.msgpack.Decoder(_Parts).decode
+_packed_sequences: Callable[[msgspec.Raw], tuple[_PackedSequence, ...]] = msgspec.msgpack.Decoder(
+    Annotated[tuple[_PackedSequence, ...], Meta(min_length=1)]
+).decode
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a request asks for."""
+
+    terms: ScoreTerms
+    sequences: Sequence[AskedSequence]
+
+    @property
+    def frames(self) -> int:
+        """Over all sequences."""
+        return sum(len(sequence.frames) for sequence in self.sequences)
+
+
+def read_request(body: bytes, content_type: str) -> Asked:
+    """What a body asks for; it is JSON unless its type says MessagePack.
+
+    Raises:
+        RequestError: it can't be used; says which field is wrong and what was expected.
+    """
+    packed = content_type.partition(";")[0].strip().lower() in MSGPACK
+    try:
+        return (_packed_quickly if packed else _json_quickly)(body) or (_packed if packed else _json)(body)
+    except ValidationError as error:
+        raise RequestError(one_sentence(error)) from None
+
+
+def _json_quickly(body: bytes) -> Asked | None:
+    """A request in JSON; None if it is not surely right."""
+    try:
+        parts = _json_parts(body)
+        sequences = _json_sequences(parts.pop("sequences"))
+        rest = msgspec.json.encode(parts)
+    except (KeyError, msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    return Asked(ScoreTerms.model_validate_json(rest, strict=True), sequences)
+
+
+def _packed_quickly(body: bytes) -> Asked | None:
+    """A request in MessagePack; None if it is not surely right."""
+    try:
+        parts = _packed_parts(body)
+        sequences = _packed_sequences(parts.pop("sequences"))
+        rest = {name: msgspec.msgpack.decode(part) for name, part in parts.items()}
+    except (KeyError, msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    if not all(frame.t is None or isfinite(frame.t) for sequence in sequences for frame in sequence.frames):
+        return None
+    return Asked(ScoreTerms.model_validate(rest), sequences)
+
+
+def _json(body: bytes) -> Asked:
+    request = ScoreRequest.model_validate_json(body, strict=True)
+    return Asked(request, request.sequences)
+
+
+def _packed(body: bytes) -> Asked:
+    try:
+        unpacked: Any = msgpack.unpackb(body, use_list=False)
+    except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
+        raise RequestError(f"the message is not MessagePack: {error or type(error).__name__}") from None
+    request = PackedScoreRequest.model_validate(unpacked)
+    return Asked(request, request.sequences)
+
+
+def take_of(number: int, sequence: AskedSequence, agreement: Agreement) -> Take:
+    """The frames of a sequence as arrays, through the gate that live frames pass.
+
+    Raises:
+        RequestError: a frame is poisoned, or has no time where it needs one.
+    """
+    name = sequence.name or f"sequence {number}"
+    try:
+        return _take_quickly(name, sequence, agreement) or _take(name, sequence, agreement)
+    except FrameError as error:
+        raise RequestError(error.message) from None
+
+
+def _take_quickly(name: str, sequence: AskedSequence, agreement: Agreement) -> Take | None:
+    """All frames at once; None if some are unlike the others or not surely right."""
+    frames, joints = sequence.frames, agreement.terms.source.skeleton
+    if isinstance(joints, Landmarks) or any(frame.t is None or frame.p is not None for frame in frames):
+        return None
+    sent = [_sent(frame.q) for frame in frames]
+    block = pose_block(sent, [frame.mask for frame in frames], len(agreement.joints), agreement.order)
+    if block is None:
+        return None
+    rotations, observed = agreement.arranged(*block)
+    return Take(name, np.array([frame.t for frame in frames], np.float64), rotations, observed, sequence.emotion)
+
+
+def _sent(q: Sent | Raw) -> Sent:
+    return q.root if isinstance(q, Raw) else q
+
+
+def _take(name: str, sequence: AskedSequence, agreement: Agreement) -> Take:
+    """Frame by frame."""
+    times, joints, observed = [], [], []
+    frames: Sequence[AskedFrame] = sequence.frames
+    for seq, sent in enumerate(frames):
+        fields = {"q": _wrapped(sent.q), "p": _wrapped(sent.p), "t": sent.t, "mask": sent.mask}
+        frame = Frame.model_construct(body=name, seq=seq, **fields)
+        times.append(agreement.time_of(frame))
+        pose = agreement.pose_of(frame)
+        joints.append(pose.joints)
+        observed.append(pose.observed)
+    return Take(name, np.array(times), np.stack(joints), np.stack(observed), sequence.emotion)
+
+
+def _wrapped(joints: Any) -> Any:
+    return trusted(Raw, {"root": joints}) if isinstance(joints, bytes) else joints
