@@ -112,7 +112,7 @@ def test_json_takes_no_bytes() -> None:
 def test_a_poisoned_frame_is_told_of() -> None:
     poisoned = raw()
     poisoned[3]["q"] = np.full((13, 4), np.nan, "<f4").tobytes()
-    with pytest.raises(RequestError, match="frame 3 of body 'walk' .* expected four finite numbers"):
+    with pytest.raises(RequestError, match=r"frame 3 of body 'walk' .* expected four finite numbers"):
         takes(read_request(msgpack.packb(request(poisoned)), MSGPACK[0]))
     short = [*raw(), {"t": 1.0, "q": b"1234"}]
     with pytest.raises(RequestError, match="frame 5 of body 'walk' has 4 bytes in q; expected 208"):

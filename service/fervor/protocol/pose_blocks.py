@@ -9,10 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from fervor.protocol.messages import Raw
 from fervor.protocol.poses import NOT_UNIT_ABOVE, UNTRACKED_BELOW
 from fervor.skeletons.skeleton import QuaternionOrder
 
-Sent = Sequence[Sequence[float] | None] | bytes | None
+Sent = Sequence[Sequence[float] | None] | bytes | Raw | None
 
 
 def pose_block(
@@ -21,7 +22,7 @@ def pose_block(
     """The rotations of frames, and which are observed.
 
     Args:
-        sent: what each frame has in `q`; raw ones are little-endian float32.
+        sent: what each frame has in `q`; bytes are little-endian float32.
         masks: what each frame has in `mask`.
         joints: that a frame must have.
         order: of the quaternion's numbers.
@@ -38,7 +39,7 @@ def pose_block(
     if not (lengths <= NOT_UNIT_ABOVE).all():
         return None
     observed = lengths >= UNTRACKED_BELOW
-    if any(mask is not None for mask in masks):
+    if masks.count(None) < len(masks):
         if not all(mask is not None and len(mask) == joints for mask in masks):
             return None
         observed &= np.array(masks, np.bool_)
@@ -47,13 +48,12 @@ def pose_block(
 
 def _rotations(sent: Sequence[Sent], joints: int) -> npt.NDArray[np.float64] | None:
     """As they were sent, [frame, joint, 4]."""
-    raw = [each for each in sent if isinstance(each, bytes)]
-    if len(raw) == len(sent):
-        if any(len(each) != 16 * joints for each in raw):
+    kinds = set(map(type, sent))
+    if bytes in kinds:
+        raw = [each for each in sent if isinstance(each, bytes)]
+        if len(kinds) > 1 or set(map(len, raw)) != {16 * joints}:
             return None
         return np.frombuffer(b"".join(raw), "<f4").reshape(len(sent), joints, 4).astype(np.float64)
-    if raw:
-        return None
     try:
         rotations = np.array(sent, np.float64)
     except (TypeError, ValueError, OverflowError):

@@ -58,13 +58,18 @@ def _load(content: Content) -> dict[str, npt.NDArray[Any]]:
     """The arrays of the file that have a meaning here."""
     try:
         with zipfile.ZipFile(io.BytesIO(content.data)) as packed:
-            unpacked = sum(item.file_size for item in packed.infolist())
-        if unpacked <= MOST_BYTES:
-            with np.load(io.BytesIO(content.data), allow_pickle=False) as arrays:
-                return {name: arrays[name] for name in arrays.files if name in _NAMES}
+            if sum(item.file_size for item in packed.infolist()) <= MOST_BYTES:
+                known = (item for item in packed.infolist() if item.filename.removesuffix(".npy") in _NAMES)
+                return {item.filename.removesuffix(".npy"): _array(packed, item) for item in known}
     except Exception as error:  # zipfile, zlib and numpy each raise their own, on any damage
         raise RecordingError(f"{content.label}: not an NPZ file that can be read ({error})") from error
     raise RecordingError(f"{content.label}: the arrays unpack to more than {MOST_BYTES >> 20} MiB")
+
+
+def _array(packed: zipfile.ZipFile, item: zipfile.ZipInfo) -> npt.NDArray[Any]:
+    with packed.open(item) as content:
+        array: npt.NDArray[Any] = np.lib.format.read_array(content, allow_pickle=False)
+    return array
 
 
 def _numbers(label: str, name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -6,7 +6,6 @@ with a sentence; so one place alone says what is wrong.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Annotated, Any
 
 import msgpack
@@ -18,7 +17,7 @@ from pydantic import ValidationError
 from fervor.errors import FrameError, RequestError
 from fervor.protocol.codec import one_sentence
 from fervor.protocol.messages import MOST_LABELS, Frame, Raw
-from fervor.protocol.pose_blocks import Sent, pose_block
+from fervor.protocol.pose_blocks import pose_block
 from fervor.protocol.skeleton_spec import MOST_JOINTS
 from fervor.protocol.trusted import trusted
 from fervor.scoring.take import Take
@@ -132,7 +131,7 @@ def _packed_quickly(body: bytes) -> Asked | None:
         rest = {name: msgspec.msgpack.decode(part) for name, part in parts.items()}
     except (KeyError, msgspec.MsgspecError, UnicodeError, RecursionError):
         return None
-    if not all(frame.t is None or isfinite(frame.t) for sequence in sequences for frame in sequence.frames):
+    if not np.isfinite([frame.t for sequence in sequences for frame in sequence.frames if frame.t is not None]).all():
         return None
     return Asked(ScoreTerms.model_validate(rest), sequences)
 
@@ -166,19 +165,17 @@ def take_of(number: int, sequence: AskedSequence, agreement: Agreement) -> Take:
 
 def _take_quickly(name: str, sequence: AskedSequence, agreement: Agreement) -> Take | None:
     """All frames at once; None if some are unlike the others or not surely right."""
-    frames, joints = sequence.frames, agreement.terms.source.skeleton
-    if isinstance(joints, Landmarks) or any(frame.t is None or frame.p is not None for frame in frames):
+    frames: Sequence[AskedFrame] = sequence.frames
+    times, points = [frame.t for frame in frames], [frame.p for frame in frames]
+    if isinstance(agreement.terms.source.skeleton, Landmarks) or None in times or points.count(None) < len(points):
         return None
-    sent = [_sent(frame.q) for frame in frames]
-    block = pose_block(sent, [frame.mask for frame in frames], len(agreement.joints), agreement.order)
+    block = pose_block(
+        [frame.q for frame in frames], [frame.mask for frame in frames], len(agreement.joints), agreement.order
+    )
     if block is None:
         return None
     rotations, observed = agreement.arranged(*block)
-    return Take(name, np.array([frame.t for frame in frames], np.float64), rotations, observed, sequence.emotion)
-
-
-def _sent(q: Sent | Raw) -> Sent:
-    return q.root if isinstance(q, Raw) else q
+    return Take(name, np.array(times, np.float64), rotations, observed, sequence.emotion)
 
 
 def _take(name: str, sequence: AskedSequence, agreement: Agreement) -> Take:
