@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
+import msgpack
 import numpy as np
 import pytest
 
@@ -78,6 +79,20 @@ async def test_so_it_is_in_every_manner(manner: dict, live: Live) -> None:
         streamed = await stream.follow(FRAMES)
     (scored,) = await score(live, score_request(FRAMES, emotion="sad", **manner))
     assert bare(scored["estimates"]) == bare(streamed)
+
+
+async def test_raw_joints_in_messagepack_are_what_a_stream_would_have_said(live: Live) -> None:
+    single = np.float32(motion(150))
+    async with talk(live) as stream:
+        await stream.start(emotion="joy")
+        streamed = await stream.follow(frames_of(np.float64(single)))
+    frames = [{"t": n / 60, "q": pose.astype("<f4").tobytes()} for n, pose in enumerate(single)]
+    request = score_request(frames, emotion="joy")
+    async with httpx.AsyncClient(base_url=live.url, timeout=60) as client:
+        content = {"content": msgpack.packb(request), "headers": {"content-type": "application/msgpack"}}
+        answer = await client.post("/v1/score", **content)
+    assert answer.status_code == 200, answer.text
+    assert bare(answer.json()["sequences"][0]["estimates"]) == bare(streamed)
 
 
 def test_neighbours_in_a_request_change_no_bit(http: httpx.Client) -> None:

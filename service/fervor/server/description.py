@@ -4,10 +4,12 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
-from pydantic.json_schema import models_json_schema
+from pydantic import BaseModel
+from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from fervor.server.problems import Problem
 from fervor.server.scoring_models import ScoreRequest
+from fervor.server.scoring_progress import LINES
 
 REFERENCE = "#/components/schemas/{model}"
 
@@ -27,7 +29,9 @@ def describe(app: FastAPI) -> dict[str, Any]:
         license_info=app.license_info,
         routes=app.routes,
     )
-    _, extra = models_json_schema([(ScoreRequest, "validation"), (Problem, "serialization")], ref_template=REFERENCE)
+    models: list[tuple[type[BaseModel], JsonSchemaMode]] = [(ScoreRequest, "validation")]
+    models += [(model, "serialization") for model in (Problem, *LINES)]
+    _, extra = models_json_schema(models, ref_template=REFERENCE)
     components = document.setdefault("components", {})
     schemas = components.setdefault("schemas", {})
     for name, schema in extra["$defs"].items():

@@ -30,6 +30,7 @@ from fervor.server.scoring_models import (
     SequenceScore,
 )
 from fervor.server.scoring_process import Allowed
+from fervor.server.scoring_progress import Meter, Told
 from fervor.server.scoring_requests import read_request, take_of
 from fervor.session.start import agree
 from fervor.skeletons.skeleton import Skeleton
@@ -62,8 +63,8 @@ class ScoringJobs:
         self._skeletons = skeletons
         self._scorer = Scorer(model, row_multiple=row_multiple)
 
-    def score(self, body: bytes, content_type: str) -> bytes:
-        """Score the sequences of a request in JSON or MessagePack.
+    def score(self, body: bytes, content_type: str, *, tell: Told | None = None) -> bytes:
+        """Score the sequences of a request in JSON or MessagePack; `tell` is told of progress.
 
         Raises:
             InputError: something in the request can't be used; says where.
@@ -75,11 +76,13 @@ class ScoringJobs:
         agreement = agree(terms_asked, self._model.metadata, self._skeletons)
         takes = [take_of(number, sequence, agreement) for number, sequence in enumerate(asked.sequences)]
         terms = replace(agreement.terms, emotion_ttl_s=math.inf)
-        scored = self._scorer.score(takes, terms)
+        scored = self._scorer.score(takes, terms, progress=Meter(asked.frames, tell).add)
         return self._answer(SequenceScore.of(each, asked.terms.detail) for each in scored)
 
-    def score_files(self, body: bytes, content_type: str, query: Mapping[str, object]) -> bytes:
-        """Score uploaded recordings: a form with files, or a body that is a file.
+    def score_files(
+        self, body: bytes, content_type: str, query: Mapping[str, object], *, tell: Told | None = None
+    ) -> bytes:
+        """Score uploaded recordings: a form with files, or a body that is a file; `tell` is told of progress.
 
         Raises:
             InputError: an option or a file can't be used; says which.
@@ -96,9 +99,11 @@ class ScoringJobs:
             raise RequestError("the form has no file; expected one or more recordings")
         self._check(len(uploads), 0)
         recordings = [_read_recording(upload, options.skeleton) for upload in uploads]
-        self._check(len(uploads), sum(map(len, recordings)))
+        frames = sum(map(len, recordings))
+        self._check(len(uploads), frames)
+        progress = Meter(frames, tell).add
         metadata = self._model.metadata
-        return self._answer(score_recordings(self._scorer, metadata, recordings, options))
+        return self._answer(score_recordings(self._scorer, metadata, recordings, options, progress=progress))
 
     def convert_file(self, body: bytes, filename: str, skeleton: str | None) -> bytes:
         """A recording on the rig, as JSON lines.

@@ -5,7 +5,8 @@ time, and every live session would feel it. It is started by the first request, 
 priority, ends when the service does (its standard input closes), and is started again if it dies: a recording that
 brings it down costs its own request at most.
 
-Both ends speak pickles with a length before them, over the pipes of the process.
+Both ends speak pickles with a length before them, over the pipes of the process: a question, then words about its
+progress where they are wanted, then the answer.
 """
 
 import asyncio
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Literal
 
 from fervor.errors import EngineError, FervorError, Overloaded
+from fervor.server.scoring_progress import Progress, Told
 from fervor.settings import LogFormat, LogLevel
 
 log = logging.getLogger(__name__)
@@ -75,8 +77,13 @@ class ScoringProcess:
         """Be told how many seconds each job took."""
         self._watchers.append(watcher)
 
-    async def run(self, job: Job, *arguments: object) -> bytes:
+    async def run(self, job: Job, *arguments: object, told: Told | None = None) -> bytes:
         """Do a job when its turn comes, and return the response body.
+
+        Args:
+            job: what to do.
+            arguments: its own.
+            told: called with its progress, now and then.
 
         Raises:
             FervorError: whatever the job raised.
@@ -90,7 +97,7 @@ class ScoringProcess:
         try:
             async with self._turn:
                 began = time.perf_counter()
-                answer = await self._ask_for_so_long(pickle.dumps((job, arguments)))
+                answer = await self._ask_for_so_long(pickle.dumps((job, arguments, bool(told))), told)
                 for watcher in self._watchers:
                     watcher(time.perf_counter() - began)
         finally:
@@ -106,22 +113,22 @@ class ScoringProcess:
         async with self._turn:
             await self._discard()
 
-    async def _ask_for_so_long(self, question: bytes) -> bytes | FervorError:
+    async def _ask_for_so_long(self, question: bytes, told: Told | None) -> bytes | FervorError:
         try:
             async with asyncio.timeout(self._timeout_s):
-                return await self._ask(question)
+                return await self._ask(question, told)
         except TimeoutError:
             return Overloaded(f"the request took longer than {self._timeout_s:g} s, and was given up")
 
-    async def _ask(self, question: bytes) -> bytes | FervorError:
+    async def _ask(self, question: bytes, told: Told | None) -> bytes | FervorError:
         if self._process is not None and self._process.returncode is not None:
             await self._discard()  # it died between two requests, which need not cost either
         process = self._process or await self._start()
-        assert process.stdout is not None
         try:
             await _write(process, question)
-            (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
-            answer = pickle.loads(await process.stdout.readexactly(length))  # noqa: S301  # our own process
+            while isinstance(answer := await _read(process), Progress):
+                if told:
+                    told(answer)
         except (asyncio.IncompleteReadError, OSError):
             await self._discard()
             log.exception("the scoring process ended")
@@ -154,6 +161,12 @@ async def _write(process: Process, content: bytes) -> None:
         await process.stdin.drain()
     except RuntimeError as problem:  # uvloop's word for a pipe that is closed already
         raise BrokenPipeError(str(problem)) from problem
+
+
+async def _read(process: Process) -> object:
+    assert process.stdout is not None
+    (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
+    return pickle.loads(await process.stdout.readexactly(length))  # noqa: S301  # our own process
 
 
 def _kill(process: Process) -> None:

@@ -19,6 +19,7 @@ from fervor.server.kept_skeletons import load_skeletons
 from fervor.server.logs import configure_logs
 from fervor.server.scoring_jobs import ScoringJobs
 from fervor.server.scoring_process import LENGTH, Start
+from fervor.server.scoring_progress import Progress, Told
 
 log = logging.getLogger(__name__)
 
@@ -36,11 +37,11 @@ class Worker:
         self._start = start
         self._jobs: ScoringJobs | None = None
 
-    def answer(self, question: bytes) -> bytes | FervorError:
-        """The response body for a pickled job, or the error to raise in its place."""
+    def answer(self, question: bytes, tell: Told) -> bytes | FervorError:
+        """The response body for a pickled job, or the error to raise in its place; `tell` is told of progress."""
         try:
-            job, arguments = pickle.loads(question)  # noqa: S301  # from our own service
-            answer = getattr(self._open(), job)(*arguments)
+            job, arguments, wants_progress = pickle.loads(question)  # noqa: S301  # from our own service
+            answer = getattr(self._open(), job)(*arguments, tell=tell if wants_progress else None)
         except FervorError as error:
             return error
         except Exception:
@@ -70,10 +71,14 @@ def serve(questions: IO[bytes], answers: IO[bytes]) -> None:
     start = pickle.loads(_read(questions))  # noqa: S301  # from our own service
     configure_logs(*start.logs)
     worker = Worker(start)
-    while question := _read(questions):
-        answer = pickle.dumps(worker.answer(question))
-        answers.write(LENGTH.pack(len(answer)) + answer)
+
+    def say(what: bytes | FervorError | Progress) -> None:
+        said = pickle.dumps(what)
+        answers.write(LENGTH.pack(len(said)) + said)
         answers.flush()
+
+    while question := _read(questions):
+        say(worker.answer(question, say))
 
 
 def _read(questions: IO[bytes]) -> bytes:
