@@ -9,7 +9,7 @@ from rich.text import Text
 
 from fervor_bench.capacity import MOST_P99_MS, Capacity
 from fervor_bench.results import Breakdown, Results
-from fervor_bench.scoring import Beside, Rate
+from fervor_bench.scoring import ALONE, Beside, Rates
 from fervor_bench.standing import Standing
 from fervor_bench.trial import Trial
 
@@ -120,13 +120,20 @@ def _stages(breakdown: Breakdown) -> Table:
     return table
 
 
-def _rates(rates: Sequence[Rate]) -> Table:
-    headings = ("sequences", "frames each", "processor time, µs a frame", "frames/s")
-    table = _table("scoring over HTTP, one processor", "body", *headings)
-    for rate in rates:
+def _rates(rates: Rates) -> Table:
+    headings = ("sequences", "frames each", "processor time, µs a frame", "x model alone", "frames/s")
+    table = _table("scoring over HTTP, one processor, two states", "body", *headings)
+    for rate in rates.kinds:
         table.add_row(
-            rate.kind, f"{rate.sequences}", f"{rate.frames}", _number(rate.server_us), f"{rate.frames_per_second:,.0f}"
+            rate.kind,
+            f"{rate.sequences}",
+            f"{rate.frames}",
+            _number(rate.server_us),
+            _ratio(rate.server_us, rates.model_us),
+            f"{rate.frames_per_second:,.0f}",
         )
+    rows, steps = ALONE
+    table.add_row("model alone, one state", f"{rows}", f"{steps}", _number(rates.model_us), "1.0", NONE)
     return table
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from fervor_bench.machine import Machine
 from fervor_bench.plan import Plan
-from fervor_bench.scoring import Beside, Rate
+from fervor_bench.scoring import Beside, Rates
 from fervor_bench.stages import Stage
 from fervor_bench.standing import Standing
 
@@ -36,7 +36,7 @@ class Results:
     left_out: Sequence[str] = ()
     """Sentences: which contestant was not measured, and why."""
     breakdowns: Sequence[Breakdown] = ()
-    rates: Sequence[Rate] = ()
+    rates: Rates | None = None
     beside: Beside | None = None
     made: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
 

@@ -15,7 +15,7 @@ from fervor_bench.generator import Load
 from fervor_bench.machine import Places, choose_places, describe_machine
 from fervor_bench.plan import Plan
 from fervor_bench.results import Breakdown, Results
-from fervor_bench.scoring import Beside, Rate, measure_beside, measure_rates
+from fervor_bench.scoring import Beside, Rates, measure_beside, measure_rates
 from fervor_bench.stages import read_stacks, sampled, share_out
 from fervor_bench.standing import Told, measure, stand
 from fervor_bench.traffic import Traffic
@@ -35,7 +35,7 @@ def measure_all(plan: Plan, *, stages: bool, scoring: bool, told: Told) -> Resul
     """
     machine, places = describe_machine(), choose_places()
     standings, left_out, breakdowns = [], [], []
-    rates: list[Rate] = []
+    rates: Rates | None = None
     beside: Beside | None = None
     with _workshop() as folder:
         for contestant, traffic in plan.entries():
@@ -109,9 +109,9 @@ def _break_down(contestant: Contestant, traffic: Traffic, plan: Plan, folder: Pa
     return Breakdown(name, plan.saturated, trial.server_us or 0.0, tuple(share_out(read_stacks(stacks))))
 
 
-def _measure_scoring(plan: Plan, folder: Path, places: Places) -> tuple[list[Rate], Beside]:
+def _measure_scoring(plan: Plan, folder: Path, places: Places) -> tuple[Rates, Beside]:
     with started(CONTESTANTS["fervor"], folder, places.server) as running:
-        rates = measure_rates(running, plan.seconds)
+        rates = measure_rates(running, places.server, plan.seconds)
         track = Track(folder, places, Traffic())
         beside = measure_beside(running, track, Load(LIVE_SESSIONS, seconds=plan.seconds))
     return rates, beside

@@ -4,20 +4,28 @@ import io
 import json
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from http.client import HTTPConnection
 
+import msgpack
 import numpy as np
 
+from fervor.emotions import EMOTIONS
+from fervor.model import Model, default_model_path
 from fervor_bench.contestant import Running
 from fervor_bench.errors import BenchError
 from fervor_bench.generator import Load
+from fervor_bench.machine import pinned
 from fervor_bench.traffic import CYCLE, Traffic
 from fervor_bench.trial import Track, Trial
 from fervor_bench.usage import family_cpu_seconds
 
-SEQUENCES = 8
+SEQUENCES = 32
 """In a request."""
+
+ALONE = (8, 300)
+"""Rows and steps of a call of the model alone, one state a body."""
 
 MOTION = Traffic()
 """Whose motions are scored: 13 joints at 30 Hz."""
@@ -36,6 +44,15 @@ class Rate:
     """On the one processor that the service has, parsing and answer included."""
     server_us: float
     """Processor time a frame of service and scoring process, microseconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """All kinds of bodies, and what the network alone takes."""
+
+    kinds: Sequence[Rate]
+    model_us: float
+    """Processor time a frame of the model alone with one state, microseconds, the least of several while they ran."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +91,30 @@ def json_request(sequences: int) -> tuple[str, bytes, str]:
     return "/v1/score", json.dumps({"skeleton": "c13", "sequences": taken}).encode(), "application/json"
 
 
-REQUESTS = {"NPZ": npz_request, "JSON": json_request}
+def msgpack_request(sequences: int) -> tuple[str, bytes, str]:
+    """Target, body and content type of the same as MessagePack, with raw joints."""
+    taken = [
+        {
+            "frames": [
+                {"t": frame / MOTION.rate_hz, "q": pose.astype("<f4").tobytes()}
+                for frame, pose in enumerate(MOTION.motion(number))
+            ]
+        }
+        for number in range(sequences)
+    ]
+    return "/v1/score", msgpack.packb({"skeleton": "c13", "sequences": taken}), "application/msgpack"
 
 
-def measure_rates(running: Running, seconds: float, sequences: int = SEQUENCES) -> list[Rate]:
-    """Score requests of each kind, one after the other, for so many seconds each."""
+REQUESTS = {"NPZ": npz_request, "MessagePack": msgpack_request, "JSON": json_request}
+
+
+def measure_rates(running: Running, processor: int, seconds: float, sequences: int = SEQUENCES) -> Rates:
+    """Score requests of each kind, one after the other, for so many seconds each; the model alone in between."""
     assert running.pid is not None
-    rates = []
+    model = Model.load(default_model_path())
+    rates, alone = [], []
     for kind, make in REQUESTS.items():
+        alone.append(_model_us(model, processor))
         request = make(sequences)
         _score(running, *request)  # the first one starts the scoring process
         begin, used, requests = time.perf_counter(), family_cpu_seconds(running.pid), 0
@@ -90,7 +123,18 @@ def measure_rates(running: Running, seconds: float, sequences: int = SEQUENCES) 
             requests += 1
         used, scored = family_cpu_seconds(running.pid) - used, requests * sequences * CYCLE
         rates.append(Rate(kind, sequences, CYCLE, scored / taken, used / scored * 1e6))
-    return rates
+    return Rates(rates, min(alone))
+
+
+def _model_us(model: Model, processor: int) -> float:
+    """Processor time a frame of the model over whole sequences, microseconds."""
+    rotations = np.stack([MOTION.motion(number) for number in range(ALONE[0])])[:, : ALONE[1]]
+    mask = np.ones(rotations.shape[:3], np.float32)
+    emotion = np.zeros((*rotations.shape[:2], len(EMOTIONS)), np.float32)
+    with pinned(processor):
+        begin = time.thread_time()
+        model.run(rotations, mask, emotion, model.zero_states(ALONE[0]))
+        return (time.thread_time() - begin) / mask[..., 0].size * 1e6
 
 
 def measure_beside(running: Running, track: Track, load: Load, sequences: int = SEQUENCES) -> Beside:

@@ -1,6 +1,7 @@
 """One measurement: a load on a running contestant, and what came of it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -85,10 +86,21 @@ class Used(NamedTuple):
 class Track:
     """Where loads run: folder, processors, and the traffic."""
 
-    def __init__(self, folder: Path, places: Places, traffic: Traffic) -> None:
+    def __init__(
+        self, folder: Path, places: Places, traffic: Traffic, *, used: Callable[[int], float] = cpu_seconds
+    ) -> None:
+        """Prepare.
+
+        Args:
+            folder: for what a run makes.
+            places: who runs where.
+            traffic: what is sent.
+            used: processor time of a contestant by its process, seconds.
+        """
         self.folder = folder
         self.places = places
         self.traffic = traffic
+        self._used = used
 
     def run(self, running: Running, load: Load) -> Trial:
         """Put a load on a contestant.
@@ -100,7 +112,7 @@ class Track:
 
         def note() -> None:
             if running.pid is not None:
-                notes.append(Used(cpu_seconds(running.pid), busy_seconds(self.places.server)))
+                notes.append(Used(self._used(running.pid), busy_seconds(self.places.server)))
 
         with self._generator(running, load) as generator:
             generator.wait_until_ready()

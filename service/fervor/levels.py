@@ -1,8 +1,9 @@
 """Intensity to level: a threshold per emotion with hysteresis and dwell, a pure function of intensities and times."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
+
+import msgspec
 
 
 class Level(StrEnum):
@@ -12,8 +13,7 @@ class Level(StrEnum):
     STRONG = "strong"
 
 
-@dataclass(frozen=True, slots=True)
-class LevelState:
+class LevelState(msgspec.Struct, frozen=True, gc=False):
     """The level of one body, and since when."""
 
     level: Level
