@@ -52,11 +52,22 @@ class Said:
     """What every lane says in every step; 0 where it says nothing."""
 
     intensity: Floats  # [lane, step]
-    by_emotion: Floats  # [lane, step, emotion]
+    by_emotion: Floats | None  # [lane, step, emotion]; None where it is not wanted
+
+    def cut(self, start: int, stop: int) -> "Said":
+        """What was said in some steps."""
+        by_emotion = None if self.by_emotion is None else self.by_emotion[:, start:stop]
+        return Said(self.intensity[:, start:stop], by_emotion)
 
 
 def run_rows(
-    model: Model, steps: Steps, rows: Sequence[Row], *, row_multiple: int, progress: Callable[[int], None]
+    model: Model,
+    steps: Steps,
+    rows: Sequence[Row],
+    *,
+    by_emotion: bool,
+    row_multiple: int,
+    progress: Callable[[int], None],
 ) -> Said:
     """Run rows, each from a state of zero.
 
@@ -64,14 +75,15 @@ def run_rows(
         model: what to run.
         steps: of all rows.
         rows: in any order; a lane has each step once at most.
+        by_emotion: whether the intensity under every emotion is wanted too.
         row_multiple: see `fervor.engine.Engine`.
         progress: called with the number of steps done since the last call.
 
     Raises:
         EngineError: the model failed, or gave an intensity that is not finite.
     """
-    count = len(steps.mask)
-    said = Said(np.zeros((LANES, count), np.float32), np.zeros((LANES, count, len(EMOTIONS)), np.float32))
+    intensity = np.zeros((LANES, len(steps.mask)), np.float32)
+    said = Said(intensity, np.zeros((*intensity.shape, len(EMOTIONS)), np.float32) if by_emotion else None)
     ordered = sorted(rows, key=len, reverse=True)
     for first in range(0, len(ordered), MOST_ROWS):
         for done in _run_together(model, steps, ordered[first : first + MOST_ROWS], said, row_multiple):
@@ -101,7 +113,8 @@ def _run_together(model: Model, steps: Steps, rows: Sequence[Row], said: Said, r
             raise EngineError("the model gave an intensity that is not finite")
         place = (np.broadcast_to(lane[:live, None], at.shape)[ran], at[ran])
         said.intensity[place] = outputs.intensity[ran]
-        said.by_emotion[place] = outputs.intensity_by_emotion[ran]
+        if said.by_emotion is not None:
+            said.by_emotion[place] = outputs.intensity_by_emotion[ran]
         yield int(ran.sum())
 
 

@@ -56,11 +56,10 @@ def score_whole(
     )
     rows = [row for number, motion in enumerate(motions) for row in motion.rows(first[number], number)]
     told = _Share(sum(map(len, takes)), sum(map(len, rows)), progress)
-    said = run_rows(model, steps, rows, row_multiple=row_multiple, progress=told.add)
+    said = run_rows(model, steps, rows, by_emotion=terms.by_emotion, row_multiple=row_multiple, progress=told.add)
     told.finish()
     return [
-        motion.conclude(Said(said.intensity[:, start:stop], said.by_emotion[:, start:stop]))
-        for motion, (start, stop) in zip(motions, pairwise(first), strict=True)
+        motion.conclude(said.cut(start, stop)) for motion, (start, stop) in zip(motions, pairwise(first), strict=True)
     ]
 
 
@@ -133,7 +132,7 @@ class _Motion:
         intensity = np.full(len(self.take), np.nan)
         intensity[unknown:] = _blend(weights, said.intensity[..., None])[step, 0]
         by_emotion = None
-        if self.terms.by_emotion:
+        if said.by_emotion is not None:
             by_emotion = np.full((len(self.take), said.by_emotion.shape[2]), np.nan)
             by_emotion[unknown:] = _blend(weights, said.by_emotion)[step]
         return Scored(
