@@ -15,7 +15,7 @@ def test_a_gain_is_of_cost_and_evenness() -> None:
 
 
 def test_one_worker_and_two_are_measured(workshop: Path) -> None:
-    one, two = measure_crews(workshop, 0.4, sessions=8)
+    one, two = measure_crews(workshop, 0.4, sessions=8, rounds=1)
     assert (one.workers, two.workers) == (1, 2)
     assert (sum(one.sessions), sum(two.sessions)) == (8, 8)
     assert len(two.sessions) == 2
