@@ -1,6 +1,7 @@
-"""`make bench`: a frame's cost inside the service, training's cost, then the service beside a naive one and the floor.
+"""`make bench`: a frame's cost inside the service, training's cost, then the service beside a naive one and the floor,
+and what a second worker is worth.
 
-Quickly: `fervor bench` does the last part at length.
+Quickly: `fervor bench` does at length what compares services.
 """
 
 import sys
@@ -13,6 +14,9 @@ from fervor_bench.frame_cost import frame_costs
 from fervor_bench.workers import worker_gains
 
 if __name__ == "__main__":
-    for table in (*frame_costs(), training(), loading(), worker_gains()):
+    for table in (*frame_costs(), training(), loading()):
         Console().print(table)
-    sys.exit(run(["bench", "--quick", *sys.argv[1:]]))
+    code = run(["bench", "--quick", *sys.argv[1:]])
+    if not code:
+        Console().print(worker_gains())
+    sys.exit(code)
