@@ -9,7 +9,7 @@ from bodies import model, motion, terms
 from fervor.engine.engine import Engine
 from fervor.errors import InputError
 from fervor.protocol.messages import Estimate
-from fervor.scoring.scorer import MOST_TOGETHER, Scorer
+from fervor.scoring.scorer import MOST_TOGETHER, Scorer, _portions
 from fervor.scoring.take import Take
 from fervor.scoring.whole import fits
 from fervor.session.body import Body, Terms
@@ -128,6 +128,19 @@ def test_whatever_the_times(gaps: list[float], origin: float, memory: str, seed:
         check([Take("any", times, item.rotations, item.observed, "joy")], terms(memory=memory))
 
 
+def test_times_without_measure_are_scored_as_the_stream() -> None:
+    times = np.array([-1.7e308, -1e300, -1e16, 0.0, 1 / 30, 1e16, 1e16 + 2, 1e300, 1.7e308])
+    check([Take("far", times, motion(9), np.ones((9, 13), np.bool_), "joy")], terms())
+
+
+def test_takes_of_many_steps_are_worked_on_in_portions() -> None:
+    slow = [take(150, seed=number, rate=1.0) for number in range(16)]
+    together = [scored.estimates() for scored in Scorer(model()).score(slow, terms())]
+    assert together[3] == Scorer(model()).score(slow[3:4], terms())[0].estimates()
+    assert len(list(_portions(range(16), [150 * 30.0] * 16))) == 2
+    assert list(_portions([0, 1, 2], [1e9, 1.0, 1.0])) == [[0], [1, 2]]
+
+
 def test_company_and_order_change_nothing() -> None:
     takes = [take(20 + number % 5, seed=number) for number in range(MOST_TOGETHER + 10)]
     scorer = Scorer(model())
@@ -138,7 +151,9 @@ def test_company_and_order_change_nothing() -> None:
 
 def test_rows_padded_to_a_multiple_say_the_same() -> None:
     takes = [take(frames, seed=frames) for frames in (1, 37, 250, 600)]
-    padded = Scorer(model(), row_multiple=4).score(takes, terms())
+    done: list[int] = []
+    padded = Scorer(model(), row_multiple=4).score(takes, terms(), progress=done.append)
+    assert sum(done) == 888
     assert [scored.estimates() for scored in padded] == [
         scored.estimates() for scored in Scorer(model()).score(takes, terms())
     ]

@@ -76,7 +76,9 @@ def grid_of(times: Times, clock: Clock, rate_hz: float) -> Grid:
 def _run(times: Times, start: int, rate_hz: float) -> tuple[Places, Times, npt.NDArray[np.bool_]]:
     """Pose, fraction and held of the steps [step] of poses without a reset among them."""
     origin, end = times[0], times[-1]
-    most = int((end - origin + 2.0 * np.spacing(end)) * rate_hz) + 3
+    most = 1
+    if len(times) > 1:  # no gap is long, so times are small enough to count steps between them
+        most = int((end - origin + 2.0 * np.spacing(max(abs(origin), abs(end)))) * rate_hz) + 3
     at = origin + np.arange(most) / rate_hz  # [step] seconds
     at = at[at <= end + SAME_INSTANT_S]
     pose = np.searchsorted(times + SAME_INSTANT_S, at)

@@ -14,8 +14,8 @@ from fervor.session.body import Terms
 MOST_TOGETHER = 256
 """Takes worked on together."""
 
-MOST_FRAMES = 1 << 16
-"""Frames worked on together, so that memory is bounded; a longer take is worked on alone."""
+MOST_STEPS = 1 << 16
+"""Frames, or steps of the model where those are more, that are worked on together; a longer take is so alone."""
 
 
 class Scorer:
@@ -51,12 +51,13 @@ class Scorer:
         whole = [at for at, take in enumerate(takes) if fits(take, terms)]
         stepwise = sorted(set(range(len(takes))) - set(whole))
         scored: dict[int, Scored] = {}
-        for places in _portions(whole, takes):
+        sizes = [_size(take, terms.metadata.rate_hz) for take in takes]
+        for places in _portions(whole, sizes):
             found = score_whole(
                 self._model, [takes[at] for at in places], terms, row_multiple=self._row_multiple, progress=tell
             )
             scored.update(zip(places, found, strict=True))
-        for places in _portions(stepwise, takes):
+        for places in _portions(stepwise, sizes):
             with self._lock:
                 found = score_stepwise(self._open(), [takes[at] for at in places], terms, tell)
             scored.update(zip(places, found, strict=True))
@@ -68,16 +69,22 @@ class Scorer:
         return self._engine
 
 
-def _portions(places: Sequence[int], takes: Sequence[Take]) -> Iterator[list[int]]:
+def _size(take: Take, rate_hz: float) -> float:
+    """Frames of a take, or the steps that they can bring where those are more; a frame brings a second's at most."""
+    seconds = float(take.times[-1]) - float(take.times[0]) if len(take) else 0.0
+    return max(len(take), min(seconds, len(take)) * rate_hz)
+
+
+def _portions(places: Sequence[int], sizes: Sequence[float]) -> Iterator[list[int]]:
     """Places of takes that are worked on together."""
     portion: list[int] = []
-    frames = 0
+    size = 0.0
     for at in places:
-        if portion and (len(portion) == MOST_TOGETHER or frames + len(takes[at]) > MOST_FRAMES):
+        if portion and (len(portion) == MOST_TOGETHER or size + sizes[at] > MOST_STEPS):
             yield portion
-            portion, frames = [], 0
+            portion, size = [], 0.0
         portion.append(at)
-        frames += len(takes[at])
+        size += sizes[at]
     if portion:
         yield portion
 

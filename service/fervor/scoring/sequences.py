@@ -93,7 +93,8 @@ def run_rows(
 
 def _run_together(model: Model, steps: Steps, rows: Sequence[Row], said: Said, row_multiple: int) -> Iterator[int]:
     """Run rows, the longest first, span by span; yields how many steps were done."""
-    rows = [*rows, *[rows[0]] * (-len(rows) % row_multiple)]
+    count = len(rows)
+    rows = [*rows, *[rows[-1]] * (-count % row_multiple)]  # padding, which says the same as the row it repeats
     start, stop, lane, emotion = np.array([(row.start, row.stop, row.lane, row.emotion) for row in rows], np.intp).T
     states: Mapping[str, Floats] = model.zero_states(len(rows))
     for begun in range(0, len(rows[0]), SPAN):
@@ -115,7 +116,7 @@ def _run_together(model: Model, steps: Steps, rows: Sequence[Row], said: Said, r
         said.intensity[place] = outputs.intensity[ran]
         if said.by_emotion is not None:
             said.by_emotion[place] = outputs.intensity_by_emotion[ran]
-        yield int(ran.sum())
+        yield int(ran[:count].sum())
 
 
 def _live(going_on: npt.NDArray[np.bool_], row_multiple: int) -> int:
