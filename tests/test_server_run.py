@@ -9,7 +9,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -17,7 +17,7 @@ import pytest
 import websockets
 
 from bodies import motion
-from fervor.server.run import AddressError, Server, bind, run
+from fervor.server.run import AddressError, Server, bind, configure, end_well, run
 from fervor.settings import Settings
 from live import PROTOCOL, Live, frames_of, score_request, talk
 from program import fervor, start_fervor
@@ -94,6 +94,20 @@ async def test_sigterm_closes_streams_with_1012_and_ends() -> None:
             assert closed.value.rcvd.code == 1012
         assert await asyncio.to_thread(process.wait, 20) == 0
         assert "Traceback" not in process.stderr.read()
+
+
+def test_an_exit_that_was_passed_over_at_the_start_is_made_up_for() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        told = end_well()
+        with suppress(SystemExit):  # as some libraries do while they load
+            signal.raise_signal(signal.SIGTERM)
+        with bind("127.0.0.1", 0) as bound:
+            listened: list[socket.socket] = []
+            Server(configure(Settings.load()), on_listening=listened.append, told=told).run(sockets=[bound])
+        assert not listened
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_ctrl_c_ends_it_quietly() -> None:

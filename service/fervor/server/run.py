@@ -11,8 +11,10 @@ import resource
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Callable
 from contextlib import ExitStack
+from typing import NoReturn
 
 import uvicorn
 
@@ -54,6 +56,7 @@ class Server(uvicorn.Server):
         config: from `configure`.
         on_listening: told each socket once connections to it are taken.
         board: where other workers listen on the same sockets.
+        told: set once this process was told to stop, from `end_well`.
     """
 
     def __init__(
@@ -62,14 +65,19 @@ class Server(uvicorn.Server):
         *,
         on_listening: Callable[[socket.socket], None] = say_where,
         board: Board | None = None,
+        told: threading.Event | None = None,
     ) -> None:
         super().__init__(config)
+        self._told = told
         self._on_listening = on_listening
         self._board = board
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen."""
         await super().startup(sockets)
+        if self._told is not None and self._told.is_set():
+            self.should_exit = True
+            return
         for bound in sockets or []:
             self._on_listening(bound)
 
@@ -95,10 +103,10 @@ def run(settings: Settings) -> None:
     """
     configure_logs(settings.log_format, settings.log_level)
     allow_files(settings.max_connections)
-    end_well()
+    told = end_well()
     with bind(settings.host, settings.port) as bound:
         if settings.workers == 1:
-            server = Server(configure(settings))
+            server = Server(configure(settings), told=told)
             gc.freeze()  # modules and the model stay to the end: the collector need not walk them beside live streams
             server.run(sockets=[bound])
         else:
@@ -107,12 +115,23 @@ def run(settings: Settings) -> None:
             Supervisor(settings, bound, on_serving=say_where).run()
 
 
-def end_well() -> None:
+def end_well() -> threading.Event:
     """Have SIGTERM end this process with exit code 0: to stop when told to is no failure.
 
     uvicorn takes the signal while it runs, and raises it again once all is done.
+
+    Returns:
+        what is set with the signal: where it comes while something loads that passes over every exception, the exit is
+        passed over too, and whoever serves then must look here.
     """
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    told = threading.Event()
+
+    def end(*_: object) -> NoReturn:
+        told.set()
+        sys.exit(0)
+
+    signal.signal(signal.SIGTERM, end)
+    return told
 
 
 def configure(settings: Settings) -> uvicorn.Config:

@@ -36,14 +36,15 @@ class Worker:
 
     def work(self) -> None:
         """Serve until told to stop."""
-        end_well()
+        told = end_well()
         signal.pthread_sigmask(signal.SIG_SETMASK, {signal.SIGINT, signal.SIGHUP})
         threading.Thread(target=self._end_with_supervisor, daemon=True).start()
         try:
             config = configure(self.settings)
             config.app.state.service.metrics.gather(self.board, self.place)  # type: ignore[union-attr]
             gc.freeze()  # as in `fervor.server.run`
-            Server(config, on_listening=lambda _: self.ready.send("serves"), board=self.board).run(sockets=[self.bound])
+            server = Server(config, on_listening=lambda _: self.ready.send("serves"), board=self.board, told=told)
+            server.run(sockets=[self.bound])
         except FervorError as error:
             sys.stderr.write(f"fervor: {error.message}\n")
             sys.exit(error.exit_code)
