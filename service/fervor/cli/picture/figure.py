@@ -15,7 +15,7 @@ from fervor.cli.picture.chart import draw_intensity, draw_moments, draw_ribbons
 from fervor.cli.picture.palette import LIGHT
 from fervor.cli.picture.strip import HIGHEST_M, LOWEST_M, draw_strip
 from fervor.cli.picture.trace import Trace
-from fervor.scoring import summarise
+from fervor.scoring.scored import Scored, summarise
 
 STYLE: dict[Any, Any] = {
     "font.size": 8.5,
@@ -105,7 +105,7 @@ def _mark_time(axes: Axes, seconds: float) -> None:
 
 def facts(trace: Trace) -> str:
     """The recording in a few numbers, those of `fervor score`."""
-    summary = summarise(trace.name, trace.estimates)
+    summary = summarise(Scored.of(trace.name, trace.estimates))
     if summary.mean is None or summary.peak is None:
         return f"{summary.frames} frames, no pose in any"
     return f"mean {summary.mean:.2f}, peak {summary.peak:.2f}, strong in {summary.strong:.0%} of the frames"

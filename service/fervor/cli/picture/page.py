@@ -14,7 +14,7 @@ from fervor.cli.picture.palette import DARK, LIGHT, THEMED
 from fervor.cli.picture.trace import Span, Trace, emotion_of, gaps, level_of, runs, spans, status_of
 from fervor.emotions import UNKNOWN
 from fervor.protocol.messages import Estimate, ModelInfo
-from fervor.scoring import summarise
+from fervor.scoring.scored import Scored, summarise
 
 MOST_ROWS = 120
 """Rows of a table of numbers."""
@@ -96,7 +96,7 @@ def page(model: ModelInfo, sections: Sequence[str]) -> str:
 
 def in_words(trace: Trace) -> str:
     """What the picture shows, for those who don't see it."""
-    summary = summarise(trace.name, trace.estimates)
+    summary = summarise(Scored.of(trace.name, trace.estimates))
     mark = threshold(trace.model, summary.emotion)
     whose = "of unknown emotion" if summary.emotion == UNKNOWN else f"of {summary.emotion}"
     levels = [f"{span.text} from {span.start:.1f} to {span.end:.1f} s" for span in spans(trace.curve, level_of)]
@@ -129,7 +129,7 @@ def _level_and_emotion(one: Estimate) -> str:
 
 def _run_row(span: Span, run: Sequence[Estimate]) -> tuple[str, ...]:
     level, _, emotion = span.text.partition(" ")
-    summary = summarise("", run)
+    summary = summarise(Scored.of("", run))
     numbers = ("-" if value is None else f"{value:.2f}" for value in (summary.mean, summary.peak))
     return f"{span.start:.2f}", f"{span.end:.2f}", emotion, level or "-", *numbers
 
