@@ -41,7 +41,8 @@ class Worker:
         """The response body for a pickled job, or the error to raise in its place; `tell` is told of progress."""
         try:
             job, arguments, wants_progress = pickle.loads(question)  # noqa: S301  # from our own service
-            answer = getattr(self._open(), job)(*arguments, tell=tell if wants_progress else None)
+            told = {"tell": tell} if wants_progress else {}
+            answer = getattr(self._open(), job)(*arguments, **told)
         except FervorError as error:
             return error
         except Exception:
