@@ -41,7 +41,7 @@ fuzz = settings(max_examples=40, deadline=None, suppress_health_check=[HealthChe
 # --- HTTP -------------------------------------------------------------------------------------------------------------
 
 
-NEVER_TAKEN = {"GET /v1/stream", "POST /v1/score/file"}
+NEVER_TAKEN = {"GET /v1/stream", "GET /v1/watch", "POST /v1/score/file", "POST /v1/convert"}
 """A plain GET is no WebSocket, and bytes drawn at random are no recording: here only refusals are tried."""
 
 
