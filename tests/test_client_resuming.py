@@ -31,6 +31,7 @@ from fervor_client.retrying import Reconnect, Retries
 CODEC = CODECS["fervor.v1.json"]
 KEY = Sealer((b"key",), 300.0)
 POSES = motion(400)
+HELD = np.tile([0.5, 0.5, 0.5, 0.5], (14, 1))
 STRANGE = SkeletonSpec(
     name="strange", joints=SEGMENTS, parents=(-1,) * 14, segments={n: n for n in SEGMENTS}, axes="global"
 )
@@ -339,6 +340,47 @@ def test_a_calibrated_session_resumes_under_its_new_alignment():
     assert [news.anew for news in torn.reconnects if news.delay_s is None] == [()] * 4
     close = life({27})  # before the first checkpoint of the new terms
     assert [estimate.seq for estimate in close.by_body()["ann"]] == list(range(90))
+
+
+def test_a_checkpoint_may_pass_over_a_life_that_a_calibration_keeps_from_being_forgotten():
+    """Ann comes back before her pose is asked for, so that her new life has a checkpoint; then Bob is asked instead."""
+
+    def life(*, cut: bool) -> list[Estimate]:
+        robot = Robot(start=opening(STRANGE, "joy", Options(checkpoint_s=60.0), resume=True))
+        robot.conversation.frame(HELD, body="ann", t=0.0)
+        robot.conversation.end_body("ann")
+        robot.conversation.frame(HELD, body="ann", t=0.1)
+        robot.conversation.calibrate(SessionCalibrate(body="ann"))
+        robot.settle()
+        robot.conversation.calibrate(SessionCalibrate(body="bob"))
+        if cut:
+            robot.cut()
+        robot.conversation.frame(HELD, body="ann", t=0.2)
+        robot.settle()
+        assert robot.conversation.reconnects == cut
+        return robot.read()
+
+    assert life(cut=True) == life(cut=False)
+
+
+def test_a_label_given_while_a_calibration_waited_outlives_the_checkpoint():
+    """Ann leaves before her pose is held and comes back: what she brings then is not forgotten with her first life."""
+    made = iter([KEY, *[Sealer((b"another",), 300.0)] * 9])
+    robot = Robot(lambda: Service(next(made)), start=opening(STRANGE, "joy", Options(), resume=True))
+    for number in range(10):
+        label = "fear" if number == 1 else None
+        robot.conversation.frame(HELD, body="ann", t=number / 30, emotion=label)
+        robot.settle()
+        if number == 0:
+            robot.conversation.calibrate(SessionCalibrate(body="ann", seconds=0.2))
+            robot.conversation.end_body("ann")
+    assert robot.conversation.take_calibration() is not None
+    robot.cut()
+    robot.settle()
+    robot.conversation.frame(HELD, body="ann", t=1 / 3)
+    robot.settle()
+    last = robot.read()[-1]
+    assert (last.seq, last.flags, last.emotion) == (10, ("reset",), "fear")
 
 
 def test_a_body_that_ends_while_a_resume_is_under_way_is_a_new_one_after_it():

@@ -46,7 +46,7 @@ export class Track {
   last = -Infinity;
   /** The service lost the label that answered frames left in force. */
   unlabelled = false;
-  #endings = 0;
+  #endings = 0; // entries that end a life
   #label: Label | undefined;
 
   /** Nothing of it was answered: all of it is still to come. */
@@ -77,7 +77,7 @@ export class Track {
 
   /** A checkpoint covers all up to this entry. */
   dropThrough(entry: Entry): void {
-    this.entries.splice(0, this.entries.indexOf(entry) + 1);
+    this.#drop(this.entries.indexOf(entry) + 1);
   }
 
   /** This body can't be resumed until its next checkpoint: only what that one may not cover is kept. */
@@ -91,7 +91,7 @@ export class Track {
   /** The service knows nothing of this body: begin with its first frame, if incomplete with an unanswered one. */
   beginAnew(): void {
     const first = this.entries.findIndex((entry) => entry.seq !== undefined && (this.whole || !entry.answered));
-    this.entries = first < 0 ? [] : this.entries.slice(first);
+    this.#drop(first < 0 ? this.entries.length : first);
     this.seq = -1;
     this.whole = true;
     this.here &&= this.entries.length > 0 && !this.entries.at(-1)?.ends;
@@ -109,21 +109,29 @@ export class Track {
 
   /** Drop the lives of this body that have ended and whose frames are all answered. */
   bury(): void {
-    for (; this.#endings > 0; this.#endings--) {
+    while (this.#endings > 0) {
       const life = this.entries.findIndex((entry) => entry.ends) + 1;
       if (this.entries.slice(0, life).some((entry) => entry.seq !== undefined && !entry.answered)) return;
-      this.entries.splice(0, life);
+      this.#drop(life);
       this.token = "";
       this.seq = -1;
       this.whole = true;
-      this.#label = undefined;
     }
+  }
+
+  /** Drop the oldest entries; where a life ends with them, only labels that were given since are in force. */
+  #drop(count: number): void {
+    const end = this.entries.findLastIndex((entry, place) => place < count && entry.ends);
+    if (end >= 0)
+      this.#label = this.entries.findLast((entry, place) => place > end && entry.answered && entry.label)?.label;
+    const gone = this.entries.splice(0, count);
+    this.#endings -= gone.filter((entry) => entry.ends).length;
   }
 
   /** Drop what stands before an answered entry, except frames under way. */
   #dropBefore(entry: Entry): void {
     const kept = this.entries.findIndex((each) => each === entry || (each.seq !== undefined && !each.answered));
     if (kept !== 0) this.seq = -1;
-    this.entries.splice(0, kept < 0 ? this.entries.length : kept);
+    this.#drop(kept < 0 ? this.entries.length : kept);
   }
 }

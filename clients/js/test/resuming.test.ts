@@ -162,6 +162,43 @@ test("a service with another key begins bodies anew, with their label, and says 
   assert.ok(robot.reconnects.some(({ reason }) => reason instanceof CheckpointUnknown));
 });
 
+test("a checkpoint may pass over a life that a calibration keeps from being forgotten", () => {
+  const [whole, torn] = [false, true].map((cut) => {
+    const robot = new Robot();
+    const waiter = { resolve: () => {}, reject: () => {} };
+    robot.frame(1, { body: "ann", t: 0 });
+    robot.conversation.endBody("ann");
+    robot.frame(2, { body: "ann", t: 0.1 }); // a new life, with a checkpoint
+    robot.conversation.calibrate({ body: "ann" }, waiter);
+    robot.settle();
+    robot.conversation.calibrate({ body: "bob" }, waiter);
+    if (cut) robot.cut();
+    robot.frame(3, { body: "ann", t: 0.2 });
+    robot.settle();
+    assert.equal(robot.conversation.reconnects, Number(cut));
+    return robot.read();
+  });
+  assert.deepEqual(torn, whole);
+});
+
+test("a label given while a calibration waited outlives the checkpoint", () => {
+  const robot = new Robot();
+  robot.frame(1, { body: "ann", t: 0 });
+  robot.settle();
+  robot.conversation.calibrate({ body: "ann" }, { resolve: () => {}, reject: () => {} });
+  robot.conversation.endBody("ann");
+  robot.frame(1, { body: "ann", t: 0.1, emotion: "fear" });
+  for (const t of [0.2, 0.3]) robot.frame(1, { body: "ann", t });
+  robot.settle();
+  robot.key = "another one";
+  robot.cut();
+  robot.settle();
+  robot.frame(1, { body: "ann", t: 0.4 });
+  robot.settle();
+  const { emotion, flags } = robot.read().at(-1)!;
+  assert.deepEqual([emotion, flags], ["fear", ["reset"]]);
+});
+
 test("beyond the most that is kept a body is given up, with a warning, and goes on from its next checkpoint", () => {
   const robot = new Robot({ mostKept: 8 });
   for (let seq = 0; seq < 20; seq++) {

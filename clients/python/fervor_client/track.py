@@ -2,7 +2,6 @@
 
 from collections import deque
 from dataclasses import dataclass, field
-from itertools import dropwhile
 from math import inf
 
 from fervor.protocol.messages import Emotion
@@ -46,6 +45,7 @@ class Track:
     newest: int = -1
     last: float = -inf  # seconds, newest frame
     endings: int = 0
+    """Entries that end a life."""
     label: tuple[Emotion, float] | None = None
     """The label that answered frames left in force."""
     unlabelled: bool = False
@@ -79,7 +79,7 @@ class Track:
 
     def drop_through(self, entry: Entry) -> None:
         """A checkpoint covers all up to this entry."""
-        while self.entries.popleft() is not entry:
+        while self._drop_first() is not entry:
             pass
 
     def give_up(self) -> None:
@@ -91,8 +91,8 @@ class Track:
 
     def begin_anew(self) -> None:
         """The service knows nothing of this body: begin with its first frame, if incomplete with an unanswered one."""
-        whole = self.whole
-        self.entries = deque(dropwhile(lambda entry: entry.seq is None or (entry.answered and not whole), self.entries))
+        while self.entries and ((first := self.entries[0]).seq is None or (first.answered and not self.whole)):
+            self._drop_first()
         self.seq, self.whole = -1, True
         self.here = self.here and bool(self.entries) and not self.entries[-1].ends
         self.unlabelled = not self.entries and self.label is not None
@@ -110,12 +110,19 @@ class Track:
             if any(entry.seq is not None and not entry.answered for entry in list(self.entries)[:life]):
                 return
             for _ in range(life):
-                self.entries.popleft()
-            self.token, self.seq, self.whole, self.label = "", -1, True, None
+                self._drop_first()
+            self.token, self.seq, self.whole = "", -1, True
+
+    def _drop_first(self) -> Entry:
+        """Drop the oldest entry; where a life ends with it, only labels that were given since are in force."""
+        first = self.entries.popleft()
+        if first.ends:
             self.endings -= 1
+            self.label = next((entry.label for entry in reversed(self.entries) if entry.answered and entry.label), None)
+        return first
 
     def _drop_before(self, entry: Entry) -> None:
         """Drop what stands before an answered entry, except frames under way."""
         while self.entries and (first := self.entries[0]) is not entry and (first.answered or first.seq is None):
-            self.entries.popleft()
+            self._drop_first()
             self.seq = -1
