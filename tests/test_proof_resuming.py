@@ -176,6 +176,8 @@ class Client:
         for kept in self.bodies.values():
             kept.token = None
         self._bury_all()
+        for each in message.checkpoints:
+            self._covered(each)
 
     def _bury_all(self) -> None:
         for name in BODIES:
@@ -408,9 +410,6 @@ class Interrupted(RuleBasedStateMachine):
         while self.service.said and most > 0:
             message = self.service.said.popleft()
             self.client.hears(message)
-            if isinstance(message, SessionCalibrated):  # its checkpoints come in one go
-                while self.service.said and isinstance(self.service.said[0], Checkpoint):
-                    self.client.hears(self.service.said.popleft())
             for estimate in (message,) if isinstance(message, Estimate) else getattr(message, "estimates", ()):
                 self._compare(self.client.key(estimate.body, estimate.seq), estimate)
             most -= 1

@@ -99,6 +99,20 @@ async def test_checkpoints_gaps_bytes_and_resumed_bodies_are_counted(start_servi
     assert metrics["fervor_sent_bytes_total"] > metrics["fervor_checkpoint_bytes_total"]
 
 
+async def test_checkpoints_that_a_calibration_brings_are_counted(start_service) -> None:
+    service = start_service()
+    async with talk(service) as session:
+        joints = (await session.start(skeleton="kinect_v2", checkpoint_s=60.0))["joints"]
+        await session.send("session.calibrate", seconds=0.2)
+        for seq in range(2):
+            await session.send("frame", seq=seq, t=seq / 4, q=[[0, 0, 0, 1]] * len(joints))
+        *_, calibrated = [await session.hear() for _ in range(3)]
+        metrics = scraped(service)
+    (checkpoint,) = calibrated["checkpoints"]
+    assert metrics["fervor_checkpoints_total"] == 1
+    assert metrics["fervor_checkpoint_bytes_total"] == len(checkpoint["token"])
+
+
 def test_scoring_is_watched(start_service) -> None:
     service = start_service()
     request = score_request(frames_of(motion(3)))

@@ -283,29 +283,29 @@ def test_a_checkpoint_comes_after_the_answers_of_its_message():
     assert said[1].seq <= said[0].estimates[-1].seq
 
 
-def test_a_calibration_follows_its_last_frame_and_is_followed_by_checkpoints():
+def test_a_calibration_follows_its_last_frame_and_brings_checkpoints():
     replica = Replica()
     replica.say(SessionStart(skeleton="kinect_v2", checkpoint_s=0.1))
     run(replica, [still(0), still(1, body="bob")])
     replica.say(SessionCalibrate(body="eve", seconds=0.3))
     said = run(replica, [still(seq) for seq in range(2, 12)])
-    assert kinds(said) == [*["estimate"] * 10, "session.calibrated", "checkpoint", "checkpoint"]
-    assert [message.body for message in said[-2:]] == ["eve", "bob"]
-    spec = said[10].skeleton
-    start = SessionStart(skeleton=spec, checkpoint_s=0.1)
-    (started,) = Replica().say(start.model_copy(update={"resume": tuple(message.token for message in said[-2:])}))
+    assert kinds(said) == [*["estimate"] * 10, "session.calibrated"]
+    checkpoints = said[10].checkpoints
+    assert [message.body for message in checkpoints] == ["eve", "bob"]
+    start = SessionStart(skeleton=said[10].skeleton, checkpoint_s=0.1)
+    (started,) = Replica().say(start.model_copy(update={"resume": tuple(message.token for message in checkpoints)}))
     assert [(body.body, body.seq) for body in started.resumed] == [("eve", 11), ("bob", 1)]
 
 
-def test_a_calibration_inside_a_message_is_followed_by_checkpoints_of_all_its_frames():
+def test_a_calibration_inside_a_message_brings_checkpoints_of_all_its_frames():
     replica = Replica()
     replica.say(SessionStart(skeleton="kinect_v2", checkpoint_s=60.0))
     run(replica, [still(0), still(1, body="bob")])
     replica.say(SessionCalibrate(body="eve", seconds=0.3))
     said = replica.say(Frames(frames=(*(still(seq) for seq in range(2, 20)), still(20, body="bob"))))
-    assert kinds(said) == ["estimates", "session.calibrated", "checkpoint", "checkpoint"]
+    assert kinds(said) == ["estimates", "session.calibrated"]
     assert said[1].frames < 18, "it was over before the message was"
-    assert {message.body: message.seq for message in said[-2:]} == {"eve": 19, "bob": 20}
+    assert {message.body: message.seq for message in said[1].checkpoints} == {"eve": 19, "bob": 20}
 
 
 def test_a_calibration_ends_with_its_body():

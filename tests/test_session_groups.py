@@ -1,6 +1,7 @@
 """Answers wait for the last of their message."""
 
-from fervor.protocol.messages import Checkpoint, Estimate
+from fervor.protocol.messages import Checkpoint, Estimate, SessionCalibrated
+from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.groups import Gathered, Groups
 
 
@@ -43,3 +44,16 @@ def test_checkpoints_follow_the_answers_and_the_newest_of_a_body_is_enough():
     gathered = groups.close(group)
     assert gathered is not None
     assert [(message.body, message.seq) for message in gathered.followers] == [("b", 2), ("a", 3)]
+
+
+def test_a_calibration_takes_the_checkpoints_that_come_with_it_into_its_message():
+    groups = Groups()
+    group = groups.open()
+    skeleton = SkeletonSpec(name="one", joints=("a",), parents=(-1,), segments={})
+    calibrated = SessionCalibrated(skeleton=skeleton, frames=1, spread_deg=0.0, unseen=())
+    checkpoints = tuple(Checkpoint(body=body, seq=1, token="x") for body in ("a", "b"))
+    for message in (calibrated, *checkpoints):
+        groups.follow(group, message)
+    gathered = groups.close(group)
+    assert gathered is not None
+    assert gathered.followers == (calibrated.model_copy(update={"checkpoints": checkpoints}),)

@@ -96,6 +96,10 @@ function filled(message: ServerMessage): ServerMessage {
         fill(DEFAULTS.Estimate, estimate);
       }
       return message;
+    case "session.calibrated":
+      fill(DEFAULTS.SessionCalibrated, message);
+      for (const each of message.checkpoints) expectFields(each, "checkpoint");
+      return message;
     case "session.started":
       fill(DEFAULTS.Limits, message.limits);
       return fill(DEFAULTS.SessionStarted, message);

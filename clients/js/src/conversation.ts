@@ -299,8 +299,8 @@ export class Conversation extends Standing {
     const asked = this.#start.skeleton ?? "c13";
     const name = typeof asked === "string" ? asked : asked.name;
     this.#start = { ...this.#start, skeleton: { ...message.skeleton, name } };
-    this.#line.log.calibrated();
-    this.#settleCalibration((waiter) => waiter.resolve(message));
+    this.#line.log.calibrated(message.checkpoints);
+    this.#settleCalibration((waiter) => waiter.resolve({ ...message, checkpoints: [] }));
   }
 
   #settleCalibration(settle: (waiter: CalibrationWaiter) => void): void {

@@ -121,18 +121,19 @@ export class Log {
     this.#bury(key.body, track);
   }
 
-  /** A checkpoint covers a body's messages up to its frame `seq`. */
-  checkpoint(message: Checkpoint): void {
+  /** A checkpoint covers a body's messages up to its frame `seq`; whether it is of such a body. */
+  checkpoint(message: Checkpoint): boolean {
     const track = this.#tracks.get(message.body);
-    if (track === undefined) return;
+    if (track === undefined) return false;
     if (message.seq !== track.seq) {
       const { latest } = this.#options;
       const covered = track.entries.find((entry) => entry.seq === message.seq && (entry.answered || latest));
-      if (covered === undefined) return;
+      if (covered === undefined) return false;
       track.dropThrough(covered);
     }
     Object.assign(track, { token: message.token, seq: message.seq, since: this.#options.now(), whole: true });
     this.#bury(message.body, track);
+    return true;
   }
 
   /** Whether the first estimate comes of a body that the service had lost; asked once for each. */
@@ -140,10 +141,11 @@ export class Log {
     return this.anew.delete(body);
   }
 
-  /** New terms are in force: checkpoints of the old ones are void, and the bodies were reset. */
-  calibrated(): void {
+  /** New terms are in force, and the bodies were reset: these checkpoints take the place of all before. */
+  calibrated(checkpoints: readonly Checkpoint[]): void {
     this.calibrationFailed();
-    for (const track of this.#tracks.values()) if (!track.untouched) track.giveUp();
+    const renewed = new Set(checkpoints.filter((each) => this.checkpoint(each)).map(({ body }) => body));
+    for (const [name, track] of this.#tracks) if (!renewed.has(name) && !track.untouched) track.giveUp();
   }
 
   /** Nothing came of it. */

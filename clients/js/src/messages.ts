@@ -321,6 +321,18 @@ export interface Estimates {
   estimates: Estimate[];
 }
 /**
+ * Everything needed to go on with a body after its frame `seq`, on any service with the same key.
+ */
+export interface Checkpoint {
+  type: "checkpoint";
+  body: string;
+  seq: number;
+  /**
+   * signed; keep it as it is
+   */
+  token: string;
+}
+/**
  * The answer to `session.calibrate`: in force from the next frame on; `session.start` takes it again.
  */
 export interface SessionCalibrated {
@@ -335,18 +347,10 @@ export interface SessionCalibrated {
    * segments that were never tracked; they keep their alignment
    */
   unseen: string[];
-}
-/**
- * Everything needed to go on with a body after its frame `seq`, on any service with the same key.
- */
-export interface Checkpoint {
-  type: "checkpoint";
-  body: string;
-  seq: number;
   /**
-   * signed; keep it as it is
+   * of each body under the new alignment, if asked for; those before are void
    */
-  token: string;
+  checkpoints: Checkpoint[];
 }
 /**
  * The service stops: last checkpoints follow, then it closes with 1012. Connect again and resume.
@@ -413,6 +417,7 @@ export const DEFAULTS = {
   },
   SessionStarted: { protocol: "fervor.v1", resumed: [] },
   Estimate: { flags: [], by_emotion: null },
+  SessionCalibrated: { checkpoints: [] },
   Pong: { id: null },
   Error: { body: null, seq: null, retry_after: null },
   Totals: { frames: 0, estimates: 0, late: 0, duplicate: 0, rejected: 0, resets: 0 },

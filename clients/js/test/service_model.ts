@@ -112,7 +112,7 @@ export class ServiceModel {
     if (!late) body.flag = "";
     this.#answer({ body: name, seq, t: time, intensity: body.digest / 2 ** 32, emotion: body.label, flags });
     this.#calibrate(name);
-    if (time - body.told >= CHECKPOINT_S && this.#held?.body !== name) this.#checkpoint(name, body, time);
+    if (time - body.told >= CHECKPOINT_S && this.#held?.body !== name) this.#say(this.#checkpoint(name, body, time));
   }
 
   /** The body, which is a new one where it was away for long; others that were are forgotten then. */
@@ -152,17 +152,18 @@ export class ServiceModel {
     this.#held = undefined;
     const spec = { name: this.#name, joints: ["a"], parents: [-1], segments: {}, title: `after ${this.#terms.length}` };
     this.#terms = JSON.stringify(spec);
-    this.#say({ type: "session.calibrated", skeleton: spec, frames: CALIBRATION_FRAMES, spread_deg: 0, unseen: [] });
-    for (const [other, body] of this.#bodies) {
+    const checkpoints = [...this.#bodies].map(([other, body]) => {
       Object.assign(body, { digest: this.#terms.length, flag: "reset" });
-      this.#checkpoint(other, body, body.last);
-    }
+      return this.#checkpoint(other, body, body.last);
+    });
+    const found = { skeleton: spec, frames: CALIBRATION_FRAMES, spread_deg: 0, unseen: [] };
+    this.#say({ type: "session.calibrated", ...found, checkpoints });
   }
 
-  #checkpoint(name: string, body: Body, time: number): void {
+  #checkpoint(name: string, body: Body, time: number): messages.Checkpoint {
     body.told = time;
     const token = JSON.stringify({ key: this.#key, terms: this.#terms, name, body });
-    this.#say({ type: "checkpoint", body: name, seq: body.newest, token });
+    return { type: "checkpoint", body: name, seq: body.newest, token };
   }
 
   #reset(name: string): void {

@@ -306,8 +306,8 @@ class Conversation(Standing):
         asked = self._start.skeleton
         name = asked if isinstance(asked, str) else asked.name
         self._start = self._start.model_copy(update={"skeleton": message.skeleton.model_copy(update={"name": name})})
-        self._line.log.calibrated()
-        self._calibrating, self._calibration = False, message
+        self._line.log.calibrated(message.checkpoints)
+        self._calibrating, self._calibration = False, message.model_copy(update={"checkpoints": ()})
 
     def _refused(self, message: Error) -> list[News]:
         error = told(message)

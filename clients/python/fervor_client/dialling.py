@@ -23,6 +23,9 @@ KEEPALIVE_S = 5.0
 KEEPALIVE_PATIENCE_S = 10.0
 """Longest wait for a pong: a loaded service may be slow."""
 
+MOST_BYTES = 4 * 1024 * 1024
+"""Longest message taken: a `session.calibrated` brings a checkpoint of each body, up to 40 kB with a window."""
+
 
 @dataclass(frozen=True, slots=True)
 class Way:
@@ -60,6 +63,7 @@ class Way:
         options: dict[str, Any] = {
             "subprotocols": [Subprotocol(SUBPROTOCOL)],
             "compression": None,
+            "max_size": MOST_BYTES,
             "additional_headers": {"Authorization": f"Bearer {self.token}"} if self.token else {},
             "close_timeout": CLOSE_TIMEOUT_S,
             "ping_interval": KEEPALIVE_S,

@@ -122,18 +122,19 @@ class Log:
         track.refused(entry, forget=forget)
         self._bury(key[0], track)
 
-    def checkpoint(self, message: Checkpoint) -> None:
-        """A checkpoint covers a body's messages up to its frame `seq`."""
+    def checkpoint(self, message: Checkpoint) -> bool:
+        """A checkpoint covers a body's messages up to its frame `seq`; whether it is of such a body."""
         track = self._tracks.get(message.body)
         if track is None:
-            return
+            return False
         if message.seq != track.seq:
             covered = next((entry for entry in track.entries if self._covers(message, entry)), None)
             if covered is None:
-                return
+                return False
             track.drop_through(covered)
         track.token, track.seq, track.since, track.whole = message.token, message.seq, self._now(), True
         self._bury(message.body, track)
+        return True
 
     def begins_anew(self, body: str) -> bool:
         """Whether the first estimate comes of a body that the service had lost; asked once for each."""
@@ -141,11 +142,12 @@ class Log:
         self.anew.discard(body)
         return begins
 
-    def calibrated(self) -> None:
-        """New terms are in force: checkpoints of the old ones are void, and the bodies were reset."""
+    def calibrated(self, checkpoints: Iterable[Checkpoint]) -> None:
+        """New terms are in force, and the bodies were reset: these checkpoints take the place of all before."""
         self.calibration_failed()
-        for track in self._tracks.values():
-            if not track.untouched:
+        renewed = {each.body for each in checkpoints if self.checkpoint(each)}
+        for name, track in self._tracks.items():
+            if name not in renewed and not track.untouched:
                 track.give_up()
 
     def calibration_failed(self) -> None:

@@ -73,7 +73,13 @@ _MESSAGES: tuple[BaseModel, ...] = (
     ),
     _ESTIMATE,
     Estimates(estimates=(_ESTIMATE,)),
-    SessionCalibrated(skeleton=_SKELETON, frames=61, spread_deg=1.5, unseen=()),
+    SessionCalibrated(
+        skeleton=_SKELETON,
+        frames=61,
+        spread_deg=1.5,
+        unseen=(),
+        checkpoints=(Checkpoint(body="ann", seq=61, token="dG9rZW4="),),  # noqa: S106  # likewise
+    ),
     Checkpoint(body="ann", seq=41, token="dG9rZW4="),  # noqa: S106  # a token of nothing
     GoingAway(seconds=5.0),
     Pong(id="7"),

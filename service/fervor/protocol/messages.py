@@ -266,6 +266,15 @@ class Estimates(_Answer):
     estimates: tuple[Estimate, ...]
 
 
+class Checkpoint(_Answer):
+    """Everything needed to go on with a body after its frame `seq`, on any service with the same key."""
+
+    type: Literal["checkpoint"] = "checkpoint"
+    body: str
+    seq: int
+    token: str = Field(description="signed; keep it as it is")
+
+
 class SessionCalibrated(_Answer):
     """The answer to `session.calibrate`: in force from the next frame on; `session.start` takes it again."""
 
@@ -274,15 +283,9 @@ class SessionCalibrated(_Answer):
     frames: int
     spread_deg: float = Field(description="largest deviation of a segment from its mean, degrees")
     unseen: tuple[str, ...] = Field(description="segments that were never tracked; they keep their alignment")
-
-
-class Checkpoint(_Answer):
-    """Everything needed to go on with a body after its frame `seq`, on any service with the same key."""
-
-    type: Literal["checkpoint"] = "checkpoint"
-    body: str
-    seq: int
-    token: str = Field(description="signed; keep it as it is")
+    checkpoints: tuple[Checkpoint, ...] = Field(
+        default=(), description="of each body under the new alignment, if asked for; those before are void"
+    )
 
 
 class GoingAway(_Answer):

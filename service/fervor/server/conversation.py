@@ -22,6 +22,7 @@ from fervor.protocol.messages import (
     Frames,
     GoingAway,
     ServerMessage,
+    SessionCalibrated,
     SessionStart,
     SessionStarted,
     Totals,
@@ -287,6 +288,9 @@ class Conversation:
                 topic = ("checkpoint", message.body)
                 self._traffic.checkpoints += 1
                 self._traffic.checkpoint_bytes += len(encoded)
+            case SessionCalibrated():
+                self._traffic.checkpoints += len(message.checkpoints)
+                self._traffic.checkpoint_bytes += sum(len(each.token) for each in message.checkpoints)
             case SessionStarted():
                 self._traffic.resumed += len(message.resumed)
         self._outbox.put(encoded, topic=topic)

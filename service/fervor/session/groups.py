@@ -21,6 +21,7 @@ class Gathered:
 
     estimates: tuple[Estimate, ...]
     followers: tuple[Follower, ...]
+    """Checkpoints or, in one message with all of them, a calibration."""
 
 
 class Groups:
@@ -58,4 +59,11 @@ class Groups:
             return None
         del self._groups[group]
         estimates = tuple(gathered.estimates[place] for place in sorted(gathered.estimates))
-        return Gathered(estimates, tuple(gathered.followers.values()))
+        return Gathered(estimates, _together(gathered.followers))
+
+
+def _together(followers: dict[str, Follower]) -> tuple[Follower, ...]:
+    """A calibration voids all checkpoints before it, so it brings the new ones: no loss can come between them."""
+    checkpoints = tuple(message for message in followers.values() if isinstance(message, Checkpoint))
+    calibrated = followers.get("")
+    return checkpoints if calibrated is None else (calibrated.model_copy(update={"checkpoints": checkpoints}),)

@@ -335,7 +335,7 @@ class Session:
         return self._tell_calibrated(ticket, message)
 
     def _tell_calibrated(self, ticket: Ticket, message: SessionCalibrated) -> list[Event]:
-        """Once its last frame is answered, in one go with checkpoints under the new terms: the old ones are void.
+        """Once its last frame is answered, in one message with checkpoints under the new terms: the old ones are void.
 
         They cover all that is answered then: where a message has frames after that one, they come after the last.
         """
