@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from fervor.server.page import built_page
+from waiting import until
 
 FLAGS = (
     "--no-sandbox",
@@ -86,12 +87,15 @@ class Visit:
     def wait_live(self) -> None:
         self.page.locator("#link[data-state=live]").wait_for()
         self.page.locator("#stream").wait_for()
-        self.page.wait_for_function("document.querySelectorAll('#emotion option').length > 1")
+        self.page.locator("#emotion option").nth(1).wait_for(state="attached")
 
     def card(self, body: str):
         """The card of a body."""
         return self.page.get_by_role("article", name=body, exact=True)
 
     def until(self, condition: str, argument: object = None) -> object:
-        """Wait until a JavaScript function of the page gives something true."""
-        return self.page.wait_for_function(condition, arg=argument).json_value()
+        """Wait until a JavaScript function of the page gives something true.
+
+        Asked again and again from here: what Playwright leaves in the page to ask there may not, by the page's policy.
+        """
+        return until(lambda: self.page.evaluate(condition, argument))
