@@ -45,7 +45,8 @@ def need_page() -> None:
 
 def chromium() -> str | None:
     """The browser's program."""
-    return shutil.which("chromium") or shutil.which("google-chrome")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    return next(filter(None, map(shutil.which, names)), None)
 
 
 def fake_camera(film: Path) -> tuple[str, ...]:

@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+import browser
+
 ROOT = Path(__file__).resolve().parents[1]
 CLIENT = ROOT / "clients" / "js"
 SCRIPTS = CLIENT / "test" / "scripts"
@@ -64,7 +66,7 @@ def desk(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def chromium() -> str:
     """The browser; skips where there is none, except in CI."""
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    found = browser.chromium()
     if found is None:
         if os.environ.get("CI"):
             pytest.fail("no Chromium is here")
