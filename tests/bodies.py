@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 
 from fervor.model import Model, default_model_path
+from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.messages import Limits, ModelInfo
 from fervor.session.body import Terms
 from fervor.session.events import Source
@@ -44,3 +45,8 @@ def motion(frames: int, *, seed: int = 0, joints: int = 13, speed: float = 0.05)
     random = np.random.default_rng(seed)
     walk = np.cumsum(random.standard_normal((frames, joints, 4)) * speed, axis=0) + np.array([0.0, 0.0, 0.0, 2.0])
     return walk / np.linalg.norm(walk, axis=-1, keepdims=True)
+
+
+def as_read(message: object) -> object:
+    """What a session said, as its client reads it."""
+    return message.to_message() if isinstance(message, LeanEstimate | LeanEstimates) else message

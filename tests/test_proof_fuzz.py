@@ -13,7 +13,7 @@ import websockets
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bodies import host, model, motion
+from bodies import as_read, host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CloseCode, FervorError
 from fervor.protocol.asyncapi import FROM_WEBSOCKET
@@ -233,8 +233,9 @@ class Edge:
 
     def _heard(self, message) -> None:
         assert not self.closed, "nothing is said after the close"
-        assert all(codec.decode_server(codec.encode(message)) == message for codec in CODECS.values())
-        self.answers += len(message.estimates) if isinstance(message, Estimates) else message.type == "estimate"
+        read = as_read(message)
+        assert all(codec.decode_server(codec.encode(message)) == read for codec in CODECS.values())
+        self.answers += len(read.estimates) if isinstance(read, Estimates) else read.type == "estimate"
         self.answers += message.type == "error" and message.seq is not None
 
 

@@ -15,7 +15,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
-from bodies import host, model, motion
+from bodies import as_read, host, model, motion
 from fervor.engine.engine import Engine
 from fervor.protocol.messages import (
     BodyEnd,
@@ -77,7 +77,7 @@ class Replica:
         for event in events:
             match event:
                 case Reply(message):
-                    self.said.append(message)
+                    self.said.append(as_read(message))
                 case Ticket():
                     self.work.append(event)
                 case Restore(slot, memory):

@@ -31,7 +31,7 @@ def streamed(item: Take, agreed: Terms) -> list[Estimate]:
     for seq, time in enumerate(item.times):
         pose = Pose(item.rotations[seq], item.observed[seq])
         ticket = body.plan(seq, float(time), pose, emotion=item.emotion if seq == 0 else None)
-        estimates.append(body.conclude(ticket, engine.run([ticket])[0]))
+        estimates.append(body.conclude(ticket, engine.run([ticket])[0]).to_message())
     return estimates
 
 

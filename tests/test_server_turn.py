@@ -7,7 +7,7 @@ import msgpack
 import numpy as np
 import pytest
 
-from bodies import host, model, motion
+from bodies import as_read, host, model, motion
 from fervor.engine.batcher import Batcher, Run
 from fervor.engine.engine import Engine
 from fervor.errors import EngineError, FervorError
@@ -52,7 +52,7 @@ class Talk:
             if isinstance(event, Ticket):
                 self.batcher.submit(event, self.deliver)
             elif isinstance(event, Reply):
-                self.said.append(event.message)
+                self.said.append(as_read(event.message))
 
     def deliver(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
         self.carry(self.session.conclude(ticket, outcome))

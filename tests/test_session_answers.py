@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from fervor.emotions import EMOTIONS
 from fervor.errors import CheckpointUnknown
 from fervor.levels import Level
-from fervor.protocol.messages import Estimate
+from fervor.protocol.lean_estimate import LeanEstimate
 from fervor.session.answers import REMEMBERED, Answers
 
 shares = st.floats(0, 1)
@@ -22,7 +22,7 @@ def lives(draw):
         intensity = draw(st.none() | shares)
         each = dict.fromkeys(EMOTIONS, draw(shares)) if by_emotion and intensity is not None else None
         told.append(
-            Estimate(
+            LeanEstimate(
                 body="eve",
                 seq=seq,
                 t=draw(st.floats(allow_nan=False, allow_infinity=False)),
@@ -59,7 +59,7 @@ def test_what_is_remembered_does_not_depend_on_how_far_the_engine_has_come(seqs,
     under_way: list[int] = []
 
     def conclude(answers, seq):
-        answers.give(Estimate(body="e", seq=seq, t=0, intensity=None, level=None, emotion="joy", status="ok"))
+        answers.give(LeanEstimate(body="e", seq=seq, t=0, intensity=None, level=None, emotion="joy", status="ok"))
 
     for seq in seqs:
         known = prompt.find(seq) is not None

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bodies import host, model, motion
+from bodies import as_read, host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CheckpointMismatch, CheckpointUnknown
 from fervor.model import Model, Outputs, default_model_path
@@ -59,7 +59,7 @@ class Replica:
         while queue:
             match queue.pop(0):
                 case Reply(message):
-                    said.append(message)
+                    said.append(as_read(message))
                 case Ticket() as ticket:
                     queue = [*self.session.conclude(ticket, self.engine.run([ticket])[0]), *queue]
                 case Restore(slot, memory):

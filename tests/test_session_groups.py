@@ -1,12 +1,13 @@
 """Answers wait for the last of their message."""
 
-from fervor.protocol.messages import Checkpoint, Estimate, SessionCalibrated
+from fervor.protocol.lean_estimate import LeanEstimate
+from fervor.protocol.messages import Checkpoint, SessionCalibrated
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.groups import Gathered, Groups
 
 
-def estimate(seq: int) -> Estimate:
-    return Estimate(body="0", seq=seq, t=0.0, intensity=0.5, level="weak", emotion="joy", status="ok")
+def estimate(seq: int) -> LeanEstimate:
+    return LeanEstimate(body="0", seq=seq, t=0.0, intensity=0.5, level="weak", emotion="joy", status="ok")
 
 
 def test_answers_come_together_in_the_order_of_their_frames():

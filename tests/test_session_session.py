@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bodies import host, model, motion
+from bodies import as_read, host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CloseCode, EngineError, MessageError, Overloaded
 from fervor.protocol.codec import JsonCodec
@@ -49,7 +49,7 @@ class Talk:
         while queue:
             match queue.pop(0):
                 case Reply(message):
-                    said.append(message)
+                    said.append(as_read(message))
                 case Ticket() as ticket:
                     queue = [*self.session.conclude(ticket, self.engine.run([ticket])[0]), *queue]
                 case Release(slot):

@@ -12,7 +12,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import FrameError, MessageError
 from fervor.protocol.frame_decoder import frames_from_json, frames_from_msgpack
-from fervor.protocol.messages import PROTOCOL, ClientMessage, Estimate, Estimates, ServerMessage
+from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
+from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
 from fervor.protocol.raw_frame import RawFrame, RawFrames, raw_frames
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
@@ -20,6 +21,10 @@ _SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
 
 
 _pack: Callable[[object], bytes] = msgspec.msgpack.Encoder().encode
+_write: Callable[[object], bytes] = msgspec.json.Encoder().encode
+
+Lean = LeanEstimate | LeanEstimates
+"""What msgspec encodes as it is."""
 
 _Message = TypeVar("_Message")
 
@@ -39,7 +44,7 @@ class Codec(Protocol):
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
 
-    def encode(self, message: ClientMessage | ServerMessage) -> str | bytes:
+    def encode(self, message: ClientMessage | ServerMessage | Lean) -> str | bytes:
         """The message as one WebSocket frame's payload."""
 
 
@@ -61,8 +66,10 @@ class JsonCodec:
         """A message from the service; raises MessageError."""
         return self._decode(_SERVER, data)
 
-    def encode(self, message: ClientMessage | ServerMessage) -> str:
+    def encode(self, message: ClientMessage | ServerMessage | Lean) -> str:
         """The message as JSON text; fields that say nothing are left out."""
+        if isinstance(message, Lean):
+            return _write(message).decode()
         return message.model_dump_json(exclude_none=message.type not in KEEP_NULLS)
 
     @staticmethod
@@ -93,16 +100,11 @@ class MsgpackCodec:
         """A message from the service; raises MessageError."""
         return self._decode(_SERVER, data)
 
-    def encode(self, message: ClientMessage | ServerMessage) -> bytes:
+    def encode(self, message: ClientMessage | ServerMessage | Lean) -> bytes:
         """The message as MessagePack; fields that say nothing are left out."""
-        match message:
-            case Estimate():  # nothing in it needs pydantic's help: its fields are what is packed
-                return _pack(vars(message))
-            case Estimates():
-                estimates = [vars(estimate) for estimate in message.estimates]
-                return _pack({"type": message.type, "estimates": estimates})
-            case _:
-                return _pack(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
+        if isinstance(message, Lean):
+            return _pack(message)
+        return _pack(message.model_dump(exclude_none=message.type not in KEEP_NULLS))
 
     @staticmethod
     def _decode(adapter: TypeAdapter[_Message], data: str | bytes) -> _Message:

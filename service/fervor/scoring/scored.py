@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fervor.emotions import EMOTIONS, UNKNOWN
 from fervor.levels import Level
+from fervor.protocol.lean_estimate import LeanEstimate
 from fervor.protocol.messages import Estimate
 from fervor.protocol.trusted import trusted
 
@@ -61,7 +62,7 @@ class Scored:
         return dict(zip(EMOTIONS, self.by_emotion[frame].tolist(), strict=True))
 
     @classmethod
-    def of(cls, name: str, estimates: Sequence[Estimate]) -> "Scored":
+    def of(cls, name: str, estimates: Sequence[Estimate | LeanEstimate]) -> "Scored":
         """The columns of one estimate a frame."""
         wanted = any(estimate.by_emotion is not None for estimate in estimates)
         rows = [[(estimate.by_emotion or {}).get(label, np.nan) for label in EMOTIONS] for estimate in estimates]

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from fervor.engine.engine import Engine
 from fervor.errors import EngineError
-from fervor.protocol.messages import Estimate
+from fervor.protocol.lean_estimate import LeanEstimate
 from fervor.scoring.scored import Scored
 from fervor.scoring.take import Take
 from fervor.session.body import Body, Terms
@@ -28,7 +28,7 @@ def score_stepwise(
         Body(take.name, slot, replace(terms, source=take.source or terms.source), take.label(terms))
         for slot, take in enumerate(takes)
     ]
-    answers: list[list[Estimate]] = [[] for _ in takes]
+    answers: list[list[LeanEstimate]] = [[] for _ in takes]
     for frame in range(max((len(take) for take in takes), default=0)):
         batch = [(at, _plan(bodies[at], take, frame)) for at, take in enumerate(takes) if frame < len(take)]
         for (at, ticket), outcome in zip(batch, engine.run([ticket for _, ticket in batch]), strict=True):

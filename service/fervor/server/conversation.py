@@ -14,14 +14,12 @@ from typing import assert_never
 
 from fervor.errors import CloseCode, EngineError, FervorError, IdleTimeout, MessageError, Overloaded, StartTimeout
 from fervor.protocol.codec import Codec
+from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.messages import (
     Checkpoint,
     ClientMessage,
-    Estimate,
-    Estimates,
     Frames,
     GoingAway,
-    ServerMessage,
     SessionCalibrated,
     SessionStart,
     SessionStarted,
@@ -33,7 +31,7 @@ from fervor.server.pace import Pace
 from fervor.server.service import Service
 from fervor.server.traffic import Traffic
 from fervor.server.wire import Wire
-from fervor.session.events import Close, Event, Outcome, Release, Reply, Restore, Ticket
+from fervor.session.events import Close, Event, Outcome, Release, Reply, Restore, Said, Ticket
 from fervor.session.poses import Read
 from fervor.session.session import Session
 from fervor.session.start import Agreement
@@ -218,7 +216,8 @@ class Conversation:
     def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
         """See `Taker`."""
         self._in_turn -= 1
-        self._make_room()
+        if self._room is not None:
+            self._make_room()
         if self._session.state is not SessionState.CLOSED:
             self._act_on(message, raw, poses)
 
@@ -235,7 +234,7 @@ class Conversation:
         try:
             self._pace.take(1, self._heard)
             message = raw or self._decode(data)
-            if isinstance(message, Frames | RawFrames):
+            if isinstance(message, RawFrames | Frames):
                 more = min(len(message.frames), self._settings.max_frames_per_message) - 1
                 self._pace.take(more, self._heard)
         except FervorError as error:
@@ -254,36 +253,40 @@ class Conversation:
     def _carry_out(self, events: Iterable[Event]) -> None:
         """Do what the session asks, in its order."""
         for event in events:
-            match event:
-                case Reply():
-                    self._say(event.message)
-                case Ticket():
-                    self._unanswered += 1
+            if isinstance(event, Ticket):
+                self._unanswered += 1
+                if event.flags:
                     self._traffic.gaps += "held" in event.flags or "gap_reset" in event.flags
-                    self._batcher.submit(event, self._deliver)
-                case Release():
-                    self._batcher.release(event.slot)
-                case Restore():
-                    self._restore(event)
-                case Close():
-                    self._reason = REASONS.get(event.code, event.reason)
-                    self._outbox.put(event)
-                    self._leave_soon()
-                case _:
-                    assert_never(event)
+                self._batcher.submit(event, self._deliver)
+            elif isinstance(event, Reply):
+                self._say(event.message)
+            else:
+                self._carry_out_rare(event)
         if self._outbox.full and self._session.state is not SessionState.CLOSED:
             self._outbox.drop()
             self._end(Overloaded("the client reads its answers too slowly"), "slow_reader")
 
-    def _say(self, message: ServerMessage) -> None:
+    def _carry_out_rare(self, event: Release | Restore | Close) -> None:
+        match event:
+            case Release():
+                self._batcher.release(event.slot)
+            case Restore():
+                self._restore(event)
+            case Close():
+                self._reason = REASONS.get(event.code, event.reason)
+                self._outbox.put(event)
+                self._leave_soon()
+            case _:
+                assert_never(event)
+
+    def _say(self, message: Said) -> None:
         """Send a message, in place of one that waits and says less."""
         encoded = self._codec.encode(message)
+        if isinstance(message, LeanEstimate | LeanEstimates):
+            self._outbox.put(encoded, topic=_topic(message) if self._latest else None)
+            return
         topic: Hashable = None
         match message:
-            case Estimate() if self._latest:
-                topic = ("estimate", message.body)
-            case Estimates() if self._latest:
-                topic = ("estimate", *(estimate.body for estimate in message.estimates))
             case Checkpoint():
                 topic = ("checkpoint", message.body)
                 self._traffic.checkpoints += 1
@@ -303,10 +306,12 @@ class Conversation:
 
     def _deliver(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
         self._unanswered -= 1
-        self._make_room()
+        if self._room is not None:
+            self._make_room()
         try:
             self._carry_out(self._session.conclude(ticket, outcome))
-            self._leave_when_done()
+            if self._leaving:
+                self._leave_when_done()
         except Exception as fault:  # noqa: BLE001  # as above
             self._give_up(fault)
 
@@ -344,3 +349,9 @@ class Conversation:
             self._watch = self._loop.call_at(until, self._look)
         else:
             self._carry_out(self._session.refuse(error(sentence)))
+
+
+def _topic(message: LeanEstimate | LeanEstimates) -> Hashable:
+    """What delivery `latest` knows an answer by: a newer one of the same replaces it."""
+    answers = (message,) if isinstance(message, LeanEstimate) else message.estimates
+    return ("estimate", *(answer.body for answer in answers))

@@ -12,7 +12,8 @@ import msgspec
 from fervor.emotions import EMOTIONS
 from fervor.errors import CheckpointUnknown
 from fervor.levels import Level
-from fervor.protocol.messages import Estimate, Flag, Status
+from fervor.protocol.lean_estimate import LeanEstimate
+from fervor.protocol.messages import Flag, Status
 
 REMEMBERED = 64
 """Frames of a body whose answer is kept."""
@@ -46,15 +47,21 @@ class Answers:
         self._under_way: dict[int, int] = {}  # seq → tickets
         self._given: dict[int, bytes] = {}  # seq → answer, oldest first
 
-    def expect(self, seq: int) -> bool:
-        """A frame comes; whether another one of this number is still under way, whose answer it shares."""
-        under_way = self._under_way.get(seq, 0)
-        if under_way and seq in self._newest:
+    def expect(self, seq: int, *, new: bool = False) -> bool:
+        """A frame comes; whether another one of this number is still under way, whose answer it shares.
+
+        Args:
+            seq: its number.
+            new: no frame had this number before.
+        """
+        under_way, newest = self._under_way, self._newest
+        tickets = 0 if new else under_way.get(seq, 0)
+        if tickets and seq in newest:
             return True
-        self._under_way[seq] = under_way + 1
-        self._newest[seq] = None
-        if len(self._newest) > REMEMBERED:
-            del self._newest[next(iter(self._newest))]
+        under_way[seq] = tickets + 1
+        newest[seq] = None
+        if len(newest) > REMEMBERED:
+            del newest[next(iter(newest))]
         return False
 
     @property
@@ -63,20 +70,20 @@ class Answers:
         return bool(self._given)
 
     @property
-    def newest(self) -> Estimate | None:
+    def newest(self) -> LeanEstimate | None:
         """What was answered last; None before the first answer."""
         kept = next(reversed(self._given.values()), None)
         return None if kept is None else self._estimate(_decode(kept))
 
-    def find(self, seq: int) -> Estimate | None:
+    def find(self, seq: int) -> LeanEstimate | None:
         """The answer that a frame of this number got; None if it is under way, forgotten or never came."""
         return self.given(seq) if seq in self._newest else None
 
-    def give(self, estimate: Estimate) -> None:
+    def give(self, estimate: LeanEstimate) -> None:
         """A frame is answered; in the order in which they came."""
-        seq, shares = estimate.seq, estimate.by_emotion
+        seq, shares, given = estimate.seq, estimate.by_emotion, self._given
         self._conclude(seq)
-        self._given[seq] = _encode(  # the fields of `_Kept`, in their order
+        given[seq] = _encode(  # the fields of `_Kept`, in their order
             (
                 seq,
                 estimate.t,
@@ -88,10 +95,10 @@ class Answers:
                 None if shares is None else tuple(shares.values()),
             )
         )
-        if len(self._given) > REMEMBERED:
-            del self._given[next(iter(self._given))]
+        if len(given) > REMEMBERED:
+            del given[next(iter(given))]
 
-    def given(self, seq: int) -> Estimate | None:
+    def given(self, seq: int) -> LeanEstimate | None:
         """The answer to a frame that another one shares; None if that failed."""
         kept = self._given.get(seq)
         return None if kept is None else self._estimate(_decode(kept))
@@ -102,11 +109,9 @@ class Answers:
         self._newest.pop(seq, None)
 
     def _conclude(self, seq: int) -> None:
-        left = self._under_way[seq] - 1
-        if left > 0:
+        left = self._under_way.pop(seq) - 1
+        if left:
             self._under_way[seq] = left
-        else:
-            del self._under_way[seq]
 
     def to_bytes(self) -> tuple[bytes, ...]:
         """All that was answered, oldest first; no bit is lost."""
@@ -131,9 +136,9 @@ class Answers:
             answers._given[seq] = each
         return answers
 
-    def _estimate(self, kept: _Kept) -> Estimate:
+    def _estimate(self, kept: _Kept) -> LeanEstimate:
         shares = kept.by_emotion
-        return Estimate(
+        return LeanEstimate(
             body=self._body,
             seq=kept.seq,
             t=kept.t,

@@ -13,8 +13,8 @@ import numpy as np
 from fervor.emotions import EMOTIONS, UNKNOWN
 from fervor.levels import LevelState, next_level
 from fervor.metadata import ModelMetadata
-from fervor.protocol.messages import Clock, Estimate, Flag, Memory, Status
-from fervor.protocol.trusted import trusted
+from fervor.protocol.lean_estimate import LeanEstimate
+from fervor.protocol.messages import Clock, Flag, Memory, Status
 from fervor.session.answers import Answers
 from fervor.session.checkpoint import Bookkeeping
 from fervor.session.events import Outcome, Pose, Source, Step, Ticket
@@ -59,6 +59,7 @@ class Body:
         "_pending",
         "_phase",
         "_put_off",
+        "_rule",
         "_terms",
         "_timeline",
         "_window",
@@ -74,6 +75,7 @@ class Body:
         self.in_flight = 0
         self.newest_seq = -1
         self._terms = terms
+        self._rule = terms.metadata.levels
         self._lanes = lane_plan(terms.metadata.rate_hz)
         self._window = window_steps(terms.memory, terms.metadata.rate_hz)
         self._label = label
@@ -99,7 +101,7 @@ class Body:
         return self._answers.any
 
     @property
-    def newest(self) -> Estimate | None:
+    def newest(self) -> LeanEstimate | None:
         """Its newest estimate; None before the first."""
         return self._answers.newest
 
@@ -115,7 +117,7 @@ class Body:
         self.reset()
         self._next_checkpoint = -math.inf  # those before are of terms that no longer hold
 
-    def answered(self, seq: int) -> Estimate | None:
+    def answered(self, seq: int) -> LeanEstimate | None:
         """The estimate a duplicate of frame `seq` gets again; None if it is under way or forgotten."""
         return _again(self._answers.find(seq))
 
@@ -145,13 +147,13 @@ class Body:
         flags: tuple[Flag, ...] = moved.flags
         if not late:
             self.newest_seq = seq
-        if "late" not in flags:
+        if not flags or "late" not in flags:
             self._last, self._label = time, label
         if moved.fresh and self._pending:
             flags, self._pending = (*self._pending, *flags), ()
         if lost:
             flags = (*flags, "lost")
-        if self._answers.expect(seq):
+        if self._answers.expect(seq, new=not late):
             flags = ("duplicate",)
         line = self._timeline = moved.timeline
         self.in_flight += 1
@@ -161,13 +163,14 @@ class Body:
             seq,
             time,
             terms.source,
-            None if lost or late or "late" in flags else pose,
+            None if lost or late or (flags and "late" in flags) else pose,
             fresh or moved.fresh,
             tuple([self._step(instant) for instant in moved.instants]),
             flags,
             line.origin if line is not None else time,
             group,
-            checkpoint=self._keep() if terms.checkpoint_s is not None and keep and self._is_due(time, spread) else None,
+            True,  # noqa: FBT003  # by place: a keyword costs as much as the field
+            self._keep() if keep and self._is_due(time, spread) else None,
         )
 
     def snapshot(self, time: float, group: int | None = None) -> Ticket:
@@ -234,7 +237,7 @@ class Body:
     def _is_due(self, time: float, spread: Spread | None) -> bool:
         """Whether a checkpoint goes with the frame at `time`: one in every span of `checkpoint_s`."""
         span = self._terms.checkpoint_s
-        if span is None or (self._next_checkpoint - span <= time < self._next_checkpoint):
+        if span is None or self._next_checkpoint - span <= time < self._next_checkpoint:
             return False
         if spread is not None and not spread.take():
             self._put_off = True
@@ -245,30 +248,29 @@ class Body:
         self._next_checkpoint = (spans + 1) * span + self._phase
         return True
 
-    def conclude(self, ticket: Ticket, outcome: Outcome) -> Estimate:
+    def conclude(self, ticket: Ticket, outcome: Outcome) -> LeanEstimate:
         """The estimate for a ticket, in the order in which tickets were planned."""
         self.in_flight -= 1
-        if ticket.flags == ("duplicate",) and (answer := _again(self._answers.given(ticket.seq))):
+        flags, steps, intensity = ticket.flags, ticket.steps, outcome.intensity
+        if flags == ("duplicate",) and (answer := _again(self._answers.given(ticket.seq))):
             return answer
         if ticket.fresh:
             self._level = None
-        if ticket.steps:
-            self._emotion = ticket.steps[-1].label.name
-        if ticket.steps and outcome.intensity is not None:
-            self._level = self._next_level(outcome.intensity, ticket.time)
-        fields = {
-            "type": "estimate",
-            "body": self.name,
-            "seq": ticket.seq,
-            "t": ticket.time,
-            "intensity": outcome.intensity,
-            "level": self._level.level if self._level and outcome.intensity is not None else None,
-            "emotion": self._emotion,
-            "status": self._status(ticket, outcome),
-            "flags": (*ticket.flags, "jump") if outcome.jumped else ticket.flags,
-            "by_emotion": self._by_emotion(outcome),
-        }
-        estimate = trusted(Estimate, fields)
+        if steps:
+            self._emotion = steps[-1].label.name
+            if intensity is not None:
+                self._level = self._next_level(intensity, ticket.time)
+        estimate = LeanEstimate(
+            self.name,
+            ticket.seq,
+            ticket.time,
+            intensity,
+            None if self._level is None or intensity is None else self._level.level,
+            self._emotion,
+            self._status(ticket, outcome),
+            (*flags, "jump") if outcome.jumped else flags,
+            self._by_emotion(outcome) if self._terms.by_emotion else None,
+        )
         self._answers.give(estimate)
         return estimate
 
@@ -298,7 +300,7 @@ class Body:
         )
 
     def _next_level(self, intensity: float, time: float) -> LevelState:
-        rule = self._terms.metadata.levels
+        rule = self._rule
         return next_level(
             self._level,
             intensity=intensity,
@@ -309,18 +311,18 @@ class Body:
         )
 
     def _status(self, ticket: Ticket, outcome: Outcome) -> Status:
-        if "lost" in ticket.flags or outcome.seen < self._enough:
+        if outcome.seen < self._enough or (ticket.flags and "lost" in ticket.flags):
             return "insufficient"
         return "warming_up" if ticket.time - ticket.since < WARM_UP_S else "ok"
 
     def _by_emotion(self, outcome: Outcome) -> dict[str, float] | None:
-        if not self._terms.by_emotion or outcome.intensity is None:
+        if outcome.intensity is None:
             return None
         return dict(zip(EMOTIONS, outcome.by_emotion.tolist(), strict=True))
 
 
-def _again(estimate: Estimate | None) -> Estimate | None:
-    return estimate and estimate.model_copy(update={"flags": (*estimate.flags, "duplicate")})
+def _again(estimate: LeanEstimate | None) -> LeanEstimate | None:
+    return None if estimate is None else msgspec.structs.replace(estimate, flags=(*estimate.flags, "duplicate"))
 
 
 def enough_joints(terms: Terms) -> float:

@@ -13,17 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from fervor.errors import CloseCode
+from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.messages import Flag, ServerMessage
 from fervor.session.checkpoint import Bookkeeping, Memory
 from fervor.session.label import Label
 from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.skeleton import Axes, Skeleton
 
+Said = ServerMessage | LeanEstimate | LeanEstimates
+"""What a session says, with estimates as they are given by the thousand."""
+
 
 class Reply(msgspec.Struct, frozen=True, gc=False):
     """Send this message, after all earlier ones."""
 
-    message: ServerMessage
+    message: Said
 
 
 @dataclass(frozen=True, slots=True)

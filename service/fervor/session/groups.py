@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from fervor.protocol.messages import Checkpoint, Estimate, SessionCalibrated
+from fervor.protocol.lean_estimate import LeanEstimate
+from fervor.protocol.messages import Checkpoint, SessionCalibrated
 
 Follower = Checkpoint | SessionCalibrated
 """What the client may build on only once it has the answers to all frames before."""
@@ -11,7 +12,7 @@ Follower = Checkpoint | SessionCalibrated
 @dataclass(slots=True)
 class _Group:
     waiting: int = 1  # one for the message itself, so that it can't end before all its frames are known
-    estimates: dict[int, Estimate] = field(default_factory=dict)  # position in the message → answer
+    estimates: dict[int, LeanEstimate] = field(default_factory=dict)  # position in the message → answer
     followers: dict[str, Follower] = field(default_factory=dict)  # by body, "" for the session
 
 
@@ -19,7 +20,7 @@ class _Group:
 class Gathered:
     """All answers to one message, in the order of its frames, and what follows them."""
 
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[LeanEstimate, ...]
     followers: tuple[Follower, ...]
     """Checkpoints or, in one message with all of them, a calibration."""
 
@@ -41,7 +42,7 @@ class Groups:
         """One of its frames is under way."""
         self._groups[group].waiting += 1
 
-    def put(self, group: int, place: int, estimate: Estimate) -> None:
+    def put(self, group: int, place: int, estimate: LeanEstimate) -> None:
         """An answer to the frame at `place`."""
         self._groups[group].estimates[place] = estimate
 

@@ -9,13 +9,12 @@ from collections.abc import Iterable, Sequence
 
 from fervor.emotions import emotion_vector
 from fervor.errors import CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
+from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
     Checkpoint,
     Error,
-    Estimate,
-    Estimates,
     Frame,
     Frames,
     Ping,
@@ -96,9 +95,9 @@ class Session:
         """
         try:
             self.state = transition(self.state, message.type)
-            if isinstance(message, Frame | RawFrame):
+            if isinstance(message, RawFrame | Frame):
                 return self._frame(message, poses[0] if poses else None)
-            if isinstance(message, Frames | RawFrames):
+            if isinstance(message, RawFrames | Frames):
                 return self._frames(message.frames, poses)
             return self._dispatch(message)
         except FervorError as error:
@@ -120,14 +119,15 @@ class Session:
 
         Outcomes may come in any order over the bodies; answers leave in the order in which the frames came.
         """
-        if ticket not in self._tickets or self.state is SessionState.CLOSED:
-            return []
-        if not self._outcomes and ticket is next(iter(self._tickets)):  # in order, and nothing waits for it
+        tickets, outcomes = self._tickets, self._outcomes
+        if ticket not in tickets:
+            return []  # of a session that is over
+        if not outcomes and ticket is next(iter(tickets)):  # in order, and nothing waits for it
             return self._conclude(ticket, outcome)
-        self._outcomes[ticket] = outcome
+        outcomes[ticket] = outcome
         events: list[Event] = []
-        while self._tickets and (oldest := next(iter(self._tickets))) in self._outcomes:
-            events += self._conclude(oldest, self._outcomes.pop(oldest))
+        while tickets and (oldest := next(iter(tickets))) in outcomes:
+            events += self._conclude(oldest, outcomes.pop(oldest))
         return events
 
     def _conclude(self, ticket: Ticket, outcome: Outcome | EngineError) -> list[Event]:
@@ -260,35 +260,46 @@ class Session:
         return [*self._roster.spare(), *events] if self._roster.has_spare else events
 
     def _plan(self, frame: AnyFrame, read: Read | None, group: int | None, place: int) -> list[Event]:
-        agreement = self._agreed
-        time = agreement.time_of(frame)
+        agreement, host, calibrator, name = self._agreed, self._host, self._calibrator, frame.body
+        time = agreement.time_of(frame) if frame.t is None else frame.t
         pose = agreement.pose_of(_plain(frame)) if read is None else read
         if isinstance(pose, FrameError):
             raise pose
-        body = self._roster.find(frame.body, time)
-        known = body is not None
+        body = self._roster.find(name, time)
         if body is not None and frame.seq <= body.newest_seq and (answer := body.answered(frame.seq)) is not None:
-            self._totals["duplicate"] += 1
-            if group is None:
-                return [Reply(answer)]
-            self._groups.put(group, place, answer)
-            return []
+            return self._answer_again(answer, group, place)
         if frame.emotion is not None:
             emotion_vector(frame.emotion)  # before a body is opened for it: a bad frame leaves no trace
+        gone: list[Event] = []
         if body is None:
-            body = self._roster.seen(frame.body, time, agreement.terms, lambda: agreement.first_label(time))
-        gone = [] if known else self._tell_gone(*self._calibrator.replaced(frame.body, self._roster))
-        keep, spread = not self._calibrator.holds(frame.body), self._host.spread
-        if spread is not None:
-            spread.note()
-        ticket = body.plan(frame.seq, time, pose, emotion=frame.emotion, group=group, keep=keep, spread=spread)
-        self._tickets[ticket] = (body, place)
+            body = self._welcome(name, time, agreement)
+            gone = self._tell_gone(*calibrator.replaced(name, self._roster))
+        if host.spread is not None:
+            host.spread.note()
+        ticket = body.plan(
+            frame.seq,
+            time,
+            pose,
+            emotion=frame.emotion,
+            group=group,
+            keep=not calibrator.holds(name),
+            spread=host.spread,
+        )
+        self._tickets[ticket] = body, place
         if group is not None:
             self._groups.expect(group)
         self._note(ticket)
-        if not (gone or self._calibrator.active):
-            return [ticket]
-        return [*gone, ticket, *self._calibrate(ticket, pose)]
+        return [*gone, ticket, *self._calibrate(ticket, pose)] if gone or calibrator.active else [ticket]
+
+    def _welcome(self, name: str, time: float, agreement: Agreement) -> Body:
+        return self._roster.seen(name, time, agreement.terms, lambda: agreement.first_label(time))
+
+    def _answer_again(self, answer: LeanEstimate, group: int | None, place: int) -> list[Event]:
+        self._totals["duplicate"] += 1
+        if group is None:
+            return [Reply(answer)]
+        self._groups.put(group, place, answer)
+        return []
 
     def _frames(self, frames: Sequence[AnyFrame], poses: Sequence[Read]) -> list[Event]:
         most = self._host.limits.max_frames_per_message
@@ -309,10 +320,10 @@ class Session:
         answers = gathered.estimates
         if self._agreed.latest:
             answers = tuple({answer.body: answer for answer in answers}.values())
-        events: list[Event] = [Reply(Estimates(estimates=answers))] if answers else []
+        events: list[Event] = [Reply(LeanEstimates(answers))] if answers else []
         return [*events, *map(Reply, gathered.followers)]
 
-    def _deliver(self, group: int | None, place: int, estimate: Estimate, body: Body) -> list[Event]:
+    def _deliver(self, group: int | None, place: int, estimate: LeanEstimate, body: Body) -> list[Event]:
         """Send an estimate, or put it with its group; delivery `latest` skips one that a newer is about to replace."""
         self._totals["estimates"] += 1
         if group is not None:

@@ -6,12 +6,12 @@ NEW ─────────────▶ OPEN ─────────�
 """
 
 from collections.abc import Mapping
-from enum import Enum, auto
+from enum import IntEnum, auto
 
 from fervor.errors import ProtocolError
 
 
-class SessionState(Enum):
+class SessionState(IntEnum):
     """Where a conversation stands."""
 
     NEW = auto()
