@@ -65,6 +65,19 @@ async def test_large_crowds_are_cut():
     assert engine.sizes == [256, 256, 88]
 
 
+async def test_prompt_tickets_run_at_once_with_what_waits():
+    engine = Counting(600)
+    batcher, done = Batcher(engine), []
+    work = tickets(engine, 600)
+    for ticket in work[:3]:
+        batcher.submit(ticket, lambda ticket, outcome: done.append(ticket))
+    batcher.run([(ticket, lambda ticket, outcome: done.append(ticket)) for ticket in work[3:]])
+    assert [ticket.slot for ticket in done] == [*range(3, 600), 0, 1, 2]
+    assert engine.sizes == [256, 256, 88]
+    await asyncio.sleep(0)
+    assert engine.sizes == [256, 256, 88]
+
+
 async def test_a_slot_is_released_only_after_its_last_ticket():
     engine = Counting(1)
     batcher = Batcher(engine)

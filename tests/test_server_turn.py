@@ -31,6 +31,7 @@ class Talk:
         self.session = Session("s", host(batcher.engine.claim))
         self.said: list[object] = []
         self.in_blocks = 0
+        self.prompted = 0
 
     @property
     def agreement(self) -> Agreement | None:
@@ -46,6 +47,15 @@ class Talk:
         except FervorError as error:
             events = self.session.refuse(error)
         self.carry(events)
+
+    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
+        ticket = self.session.prompt(frame, read)
+        self.in_blocks += ticket is not None
+        self.prompted += ticket is not None
+        return ticket
+
+    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
+        self.said += map(as_read, self.session.answer(ticket, outcome))
 
     def carry(self, events) -> None:
         for event in events:
@@ -97,6 +107,7 @@ async def test_estimates_are_those_of_the_plain_way_to_the_bit(batcher: Batcher)
             talk.carry(talk.session.receive(CODEC.decode_client(message)))
             batcher.run()
     assert [talk.in_blocks for talk in together] == [40] * 12
+    assert [talk.prompted for talk in together] == [39] * 12  # all but each body's first
     assert [talk.estimates() for talk in together] == [talk.estimates() for talk in alone]
     assert all(len(talk.estimates()) == 40 for talk in alone)
 
@@ -124,6 +135,40 @@ async def test_order_is_kept_between_frames_and_all_else(batcher: Batcher) -> No
     await settle(batcher, turn)
     assert [estimate.flags for estimate in talk.estimates()][:1] == [()]
     assert [estimate.flags for estimate in talk.estimates()][2] == ("reset",)
+
+
+async def test_what_comes_behind_a_prompt_frame_waits_for_its_answer(batcher: Batcher) -> None:
+    turn, talks = Turn(batcher), [Talk(batcher) for _ in range(3)]
+    first, *more = frames(2, 4)
+    for talk in talks:
+        turn.put(talk, start())
+        turn.put(talk, first)
+    await settle(batcher, turn)
+    end = msgpack.packb({"type": "session.end"})
+    for message in (*more, end):
+        for talk in talks:
+            turn.put(talk, message)
+    await settle(batcher, turn)
+    for talk in talks:
+        assert talk.prompted == 3
+        assert [message.type for message in talk.said[1:]] == ["estimate"] * 4 + ["session.ended"]
+        assert [estimate.seq for estimate in talk.estimates()] == [0, 1, 2, 3]
+
+
+async def test_a_prompt_frame_whose_run_failed_is_told(batcher: Batcher, monkeypatch) -> None:
+    turn, talk = Turn(batcher), Talk(batcher)
+    first, second, third = frames(2, 3)
+    for message in (start(), first):
+        turn.put(talk, message)
+    await settle(batcher, turn)
+    with monkeypatch.context() as broken:
+        broken.setattr(batcher.engine, "run", lambda tickets: [EngineError("no")] * len(tickets))
+        turn.put(talk, second)
+        await settle(batcher, turn)
+    turn.put(talk, third)
+    await settle(batcher, turn)
+    assert [message.type for message in talk.said[1:]] == ["estimate", "error", "estimate"]
+    assert talk.estimates()[-1].flags == ("reset",)
 
 
 async def test_a_poisoned_frame_costs_its_neighbours_nothing(batcher: Batcher) -> None:

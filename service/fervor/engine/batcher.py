@@ -9,7 +9,7 @@ import asyncio
 import logging
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from fervor.engine.engine import Engine
@@ -57,9 +57,15 @@ class Batcher:
         self.depth += 1
         self._schedule()
 
-    def run(self) -> None:
-        """Run what waits without another turn of the loop; for who has just submitted all that it had."""
-        if self._waiting:
+    def run(self, prompt: Sequence[tuple[Ticket, Deliver]] = ()) -> None:
+        """Run what waits without another turn of the loop; for who has just submitted all that it had.
+
+        Args:
+            prompt: more tickets, that need not wait: of slots that have none waiting, at most one each.
+        """
+        for first in range(0, len(prompt), MOST_TICKETS):
+            self._run(prompt[first : first + MOST_TICKETS])
+        if self._waiting and not prompt:
             self._run()
 
     def release(self, slot: int) -> None:
@@ -75,12 +81,15 @@ class Batcher:
             self._since = time.perf_counter()
             asyncio.get_running_loop().call_soon(self._run)
 
-    def _run(self) -> None:
-        """One batch: the oldest ticket of every slot that has one."""
-        self._scheduled = False
+    def _run(self, prompt: Sequence[tuple[Ticket, Deliver]] = ()) -> None:
+        """One batch: prompt tickets, and the oldest ticket of every slot that has one waiting."""
         if not self._waiting:
-            return  # `run` was first
-        batch = [self._take(slot) for slot in list(self._waiting)[:MOST_TICKETS]]
+            if not prompt:
+                self._scheduled = False
+                return  # `run` was first
+            self._since = time.perf_counter()
+        batch = [*prompt, *[self._take(slot) for slot in list(self._waiting)[: MOST_TICKETS - len(prompt)]]]
+        self._scheduled = False
         tickets = [ticket for ticket, _ in batch]
         start, since = time.perf_counter(), self._since
         outcomes = self._outcomes(tickets)

@@ -221,6 +221,29 @@ class Conversation:
         if self._session.state is not SessionState.CLOSED:
             self._act_on(message, raw, poses)
 
+    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
+        """See `Taker`."""
+        if self._leaving or not self._pace.has_room:
+            return None
+        ticket = self._session.prompt(frame, read)
+        if ticket is not None:
+            self._in_turn -= 1
+            self._pace.take(1, self._heard)
+            if ticket.flags:
+                self._note_gap(ticket)
+        return ticket
+
+    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
+        """See `Taker`."""
+        if self._room is not None:
+            self._make_room()
+        try:
+            for said in self._session.answer(ticket, outcome):
+                self._say(said)
+            self._end_if_slow()
+        except Exception as fault:  # noqa: BLE001  # as below
+            self._give_up(fault)
+
     def _act_on(self, data: str | bytes, raw: RawFrame | RawFrames | None = None, poses: Sequence[Read] = ()) -> None:
         if self._leaving:
             return  # what comes now is after the last checkpoint: the client sends it again where it resumes
@@ -256,12 +279,18 @@ class Conversation:
             if isinstance(event, Ticket):
                 self._unanswered += 1
                 if event.flags:
-                    self._traffic.gaps += "held" in event.flags or "gap_reset" in event.flags
+                    self._note_gap(event)
                 self._batcher.submit(event, self._deliver)
             elif isinstance(event, Reply):
                 self._say(event.message)
             else:
                 self._carry_out_rare(event)
+        self._end_if_slow()
+
+    def _note_gap(self, ticket: Ticket) -> None:
+        self._traffic.gaps += "held" in ticket.flags or "gap_reset" in ticket.flags
+
+    def _end_if_slow(self) -> None:
         if self._outbox.full and self._session.state is not SessionState.CLOSED:
             self._outbox.drop()
             self._end(Overloaded("the client reads its answers too slowly"), "slow_reader")

@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from itertools import islice
 from typing import NamedTuple, Protocol
 
-from fervor.engine.batcher import Batcher
+from fervor.engine.batcher import Batcher, Deliver
+from fervor.errors import EngineError
 from fervor.protocol.raw_frame import RawFrame, RawFrames
+from fervor.session.events import Outcome, Ticket
 from fervor.session.poses import Read, read_poses
 from fervor.session.start import Agreement
 
@@ -30,6 +32,12 @@ class Taker(Protocol):
 
     def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
         """Do what the message asks; of raw frames, the poses were read already. Never raises."""
+
+    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
+        """The ticket of a frame about which nothing is unusual; None, having done nothing: `take` is to see it."""
+
+    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
+        """Answer a frame whose ticket `prompt` gave; before anything else is taken. Never raises."""
 
 
 class Turn:
@@ -57,9 +65,25 @@ class Turn:
         except Exception:  # a fault of ours must cost nobody a message: then every session reads by itself
             log.exception("the frames of a turn could not be read together")
             together = [_Ready(taker, message, None, ()) for taker, message in came]
-        for taker, message, raw, poses in together:
-            taker.take(message, raw, poses)
-        self._batcher.run()
+        while together:
+            together = self._pass(together)
+
+    def _pass(self, ready: Sequence["_Ready"]) -> list["_Ready"]:
+        """Take messages and run what they bring; returns those behind a prompt frame of the same session."""
+        prompt: list[tuple[Ticket, Deliver]] = []
+        busy: set[Taker] = set()
+        later = []
+        for each in ready:
+            taker, message, raw, poses = each
+            if taker in busy:
+                later.append(each)
+            elif isinstance(raw, RawFrame) and poses and (ticket := taker.prompt(raw, poses[0])) is not None:
+                prompt.append((ticket, taker.answer))
+                busy.add(taker)
+            else:
+                taker.take(message, raw, poses)
+        self._batcher.run(prompt)
+        return later
 
 
 class _Ready(NamedTuple):

@@ -31,7 +31,7 @@ from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.session.body import Body
 from fervor.session.calibrator import Calibrator
 from fervor.session.checkpoint import Bond, pack
-from fervor.session.events import Close, Event, Outcome, Pose, Reply, Source, Ticket
+from fervor.session.events import Close, Event, Outcome, Pose, Reply, Said, Source, Ticket
 from fervor.session.groups import Groups
 from fervor.session.host import Host
 from fervor.session.poses import Read
@@ -103,6 +103,42 @@ class Session:
         except FervorError as error:
             return self.refuse(error)
 
+    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
+        """The ticket of a frame about which nothing is unusual, as nearly all are; None: `receive` is to take it.
+
+        For a caller that runs the ticket, and hands its outcome to `answer`, before anything else of this session:
+        then nothing need be kept of it meanwhile. What comes of it is the same.
+
+        Args:
+            frame: as it came.
+            read: its pose, which was read already.
+        """
+        unsettled = self._tickets or self._calibrator.active or self._roster.has_spare
+        if unsettled or self.state is not SessionState.OPEN or frame.t is None or isinstance(read, FrameError):
+            return None
+        body = self._roster.find(frame.body, frame.t)
+        if body is None or frame.seq <= body.newest_seq:
+            return None
+        spread = self._host.spread
+        try:
+            ticket = body.plan(frame.seq, frame.t, read, emotion=frame.emotion, spread=spread)
+        except InputError:
+            return None  # it left no trace
+        if spread is not None:
+            spread.note()
+        self._note(ticket)
+        return ticket
+
+    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> Sequence[Said]:
+        """What the outcome of a ticket from `prompt` brings."""
+        body = self._roster.known(ticket.body)
+        if isinstance(outcome, EngineError):
+            return (self._failed(ticket, body, outcome),)
+        self._totals["estimates"] += 1
+        estimate = body.conclude(ticket, outcome)
+        checkpoint = None if ticket.checkpoint is None else self._checkpoint(ticket, body, outcome)
+        return (estimate,) if checkpoint is None else (estimate, checkpoint)
+
     def refuse(self, error: FervorError) -> list[Event]:
         """Tell the client of an error; end the session where it is fatal, or where it never began."""
         if self.state is SessionState.CLOSED:
@@ -134,7 +170,7 @@ class Session:
         body, place = self._tickets.pop(ticket)
         events: list[Event] = []
         if isinstance(outcome, EngineError):
-            events = self._fail(ticket, body, outcome)
+            events = [Reply(self._failed(ticket, body, outcome))] if ticket.answer else []
         elif ticket.answer:
             events = self._deliver(ticket.group, place, body.conclude(ticket, outcome), body)
         if ticket.group is not None or ticket.checkpoint is not None or self._calibrated:
@@ -361,11 +397,9 @@ class Session:
         """A calibration is over without a result, if there is an error that says so."""
         return [] if error is None else [Reply(_error(error).model_copy(update={"body": body}))]
 
-    def _fail(self, ticket: Ticket, body: Body, error: EngineError) -> list[Event]:
-        if not ticket.answer:
-            return []
+    def _failed(self, ticket: Ticket, body: Body, error: EngineError) -> Error:
         body.fail(ticket)
-        return [Reply(Error(code=error.code, message=error.message, fatal=False, body=ticket.body, seq=ticket.seq))]
+        return Error(code=error.code, message=error.message, fatal=False, body=ticket.body, seq=ticket.seq)
 
     def _ended(self, reason: str) -> list[Event]:
         return [Reply(SessionEnded(reason=reason, totals=self.totals)), *self._close(CloseCode.NORMAL, reason)]
