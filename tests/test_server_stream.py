@@ -333,7 +333,7 @@ async def test_a_slow_reader_is_told_and_closed(start_service) -> None:
 
 
 async def test_who_never_reads_is_left_behind_and_hurts_nobody(start_service, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fervor.server.conversation.CLOSE_GRACE_S", 0.2)
+    monkeypatch.setattr("fervor.server.life.CLOSE_GRACE_S", 0.2)
     service = start_service(max_unsent_bytes=100_000)
     async with talk(service) as healthy:
         await healthy.start(emotion="joy")

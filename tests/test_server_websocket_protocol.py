@@ -158,7 +158,7 @@ async def test_a_client_that_never_shakes_hands_is_shown_the_door(start_service)
 
 
 async def test_who_never_takes_his_close_is_cut(start_service, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fervor.server.conversation.CLOSE_GRACE_S", 0.2)
+    monkeypatch.setattr("fervor.server.life.CLOSE_GRACE_S", 0.2)
     monkeypatch.setattr("fervor.server.websocket_protocol.LEFT_BEHIND_S", 0.2)
     service = start_service(max_unsent_bytes=100_000, max_frames_per_second=1e9)
     deaf = RawClient(service)

@@ -1,18 +1,15 @@
-"""One wire: carries messages to a session, its tickets to the batcher, and its replies back to the client.
+"""The talk of a conversation: messages go to a session, its tickets to the batcher, its replies back to the client.
 
-Rules. The session decides everything; this edge adds only what needs a clock or a socket: the two timeouts, the pace,
-and what becomes of a slow reader. All sends pass one outbox, so they leave in the order in which the session said
-them. A frame never waits for another session's client. Nothing that one client sends can raise beyond its own
+Rules. The session decides everything; this edge adds only what needs a clock or a socket: the pace, what becomes of a
+slow reader and, in `Life`, the timeouts. All sends pass one outbox, so they leave in the order in which the session
+said them. A frame never waits for another session's client. Nothing that one client sends can raise beyond its own
 conversation.
 """
 
-import asyncio
-import logging
-import secrets
 from collections.abc import Hashable, Iterable, Sequence
 from typing import assert_never
 
-from fervor.errors import CloseCode, EngineError, FervorError, IdleTimeout, MessageError, Overloaded, StartTimeout
+from fervor.errors import EngineError, FervorError, MessageError, Overloaded
 from fervor.protocol.codec import Codec
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.messages import (
@@ -23,36 +20,22 @@ from fervor.protocol.messages import (
     SessionCalibrated,
     SessionStart,
     SessionStarted,
-    Totals,
 )
 from fervor.protocol.raw_frame import RawFrame, RawFrames
-from fervor.server.outbox import Outbox
+from fervor.server.life import REASONS, Life
 from fervor.server.pace import Pace
 from fervor.server.service import Service
-from fervor.server.traffic import Traffic
 from fervor.server.wire import Wire
 from fervor.session.events import Close, Event, Outcome, Release, Reply, Restore, Said, Ticket
 from fervor.session.poses import Read
-from fervor.session.session import Session
 from fervor.session.start import Agreement
 from fervor.session.state import SessionState
-
-log = logging.getLogger(__name__)
-
-CLOSE_GRACE_S = 5.0
-"""Seconds that a client has to take a close before it is left behind."""
 
 BYTES_A_FRAME = 1024
 """A message that can't be read uses up the pace of as many frames as it had room for."""
 
-GONE = "gone"
-"""Why a session ended whose client left without a word."""
 
-REASONS = {CloseCode.NORMAL: "ended", CloseCode.RESTART: "restart"}
-"""Why a session ended, for programs; otherwise the code of the error that ended it."""
-
-
-class Conversation:
+class Conversation(Life):
     """A session and its wire."""
 
     def __init__(self, wire: Wire, service: Service, codec: Codec, *, client: str | None = None) -> None:
@@ -64,122 +47,16 @@ class Conversation:
             codec: what was agreed on.
             client: the name of the client's token, for logs.
         """
-        self._wire = wire
+        super().__init__(wire, service, client=client)
         self._codec = codec
-        self._settings = service.settings
         self._batcher = service.batcher
-        self._turn = service.turn
-        self._backlog = service.backlog
-        self._drain = service.drain
-        self._metrics = service.metrics
-        self._tracing = service.tracing
         self._leaving = False
         self._latest = False  # whether the client wants the newest estimates only
-        self._session = Session(secrets.token_hex(8), service.host)
-        self._about = {"session": self._session.session_id, "client": client}
-        self._log = logging.LoggerAdapter(log, self._about)
-        self._reason = GONE
-        self._traffic = Traffic()
-        self._outbox = Outbox(wire, most_bytes=service.settings.max_unsent_bytes)
-        self._loop = asyncio.get_running_loop()
-        self._opened = self._heard = self._loop.time()  # seconds; `heard`: when the newest message came
         self._pace = Pace(service.settings.max_frames_per_second, service.settings.max_frames_per_message)
-        self._unanswered = 0
-        self._in_turn = 0  # messages that wait for the end of a turn
-        self._waits_for_message = False
-        self._room: asyncio.Future[None] | None = None  # while no more are taken: when some may be
-        self._patience = asyncio.timeout(None)
-        soonest = min(service.settings.start_timeout_s, service.settings.idle_timeout_s)
-        self._watch = self._loop.call_later(soonest, self._look)
-
-    async def run(self) -> None:
-        """Talk until either side closes, then free what the session held."""
-        sender = asyncio.create_task(self._send_all())
-        self._drain.enter(self)
-        self._log.info("session begun (%s)", self._codec.subprotocol)
-        try:
-            async with self._patience:
-                await self._listen()
-                if self._session.state is SessionState.CLOSED:
-                    await sender
-        except TimeoutError:
-            self._log.info("the client did not take its close")
-        finally:
-            self._watch.cancel()
-            self._drain.leave(self)
-            self._carry_out(self._session.lost())
-            sender.cancel()
-            await asyncio.gather(sender, return_exceptions=True)
-            self._sign_off()
-
-    async def _listen(self) -> None:
-        """Take messages until the end; hold back a client far ahead of its answers, and all when too much waits."""
-        self._wire.listen(self._take_at_once)
-        while self._session.state is not SessionState.CLOSED:
-            self._waits_for_message = True
-            message = await self._wire.receive()
-            self._waits_for_message = False
-            if message is None:
-                return
-            self._note(message)
-            if self._backlog.full:
-                await self._backlog.wait()
-            self._act_on(message)
-            while self._has_enough:
-                self._room = self._loop.create_future()
-                await self._room
-
-    def _take_at_once(self, message: str | bytes) -> bool:
-        """Take a message with all of its turn, unless something holds it back: then `_listen` gets it."""
-        if not self._waits_for_message or self._backlog.full or self._has_enough:
-            return False
-        if self._session.state is SessionState.CLOSED:
-            return False
-        self._note(message)
-        self._in_turn += 1
-        self._turn.put(self, message)
-        return True
-
-    def _note(self, message: str | bytes) -> None:
-        self._heard = self._loop.time()
-        self._traffic.bytes_in += len(message)
 
     @property
-    def _has_enough(self) -> bool:
-        """Whether so many frames are unanswered that no more are taken just now."""
-        return self._unanswered + self._in_turn >= self._settings.max_unanswered_frames
-
-    def _sign_off(self) -> None:
-        totals, seconds = self.totals, self._loop.time() - self._opened
-        self._metrics.note_end(self._reason)
-        log.info(
-            "session ended: %s, after %.1f s, %d frames, %d estimates, %d rejected",
-            self._reason,
-            seconds,
-            totals.frames,
-            totals.estimates,
-            totals.rejected,
-            extra={**self._about, "reason": self._reason, "totals": totals.model_dump()},
-        )
-        about = {name: value for name, value in self._about.items() if value}
-        self._tracing.note_session(seconds, {**about, "reason": self._reason, **totals.model_dump()})
-
-    @property
-    def traffic(self) -> Traffic:
-        """What went over the wire so far."""
-        self._traffic.bytes_out = self._outbox.bytes_sent
-        self._traffic.superseded = self._outbox.superseded
-        return self._traffic
-
-    @property
-    def totals(self) -> Totals:
-        """What it came to so far."""
-        return self._session.totals
-
-    @property
-    def session(self) -> Session:
-        """What it is about, for who watches."""
-        return self._session
+    def _encoding(self) -> str:
+        return self._codec.subprotocol
 
     def go_away(self, seconds: float) -> None:
         """The service stops: take no more frames, send the last checkpoints, and close with 1012 after them."""
@@ -344,40 +221,9 @@ class Conversation:
         except Exception as fault:  # noqa: BLE001  # as above
             self._give_up(fault)
 
-    def _make_room(self) -> None:
-        """Let `_listen` look whether there is room for more."""
-        if self._room is not None and not self._room.done():
-            self._room.set_result(None)
-
     def _give_up(self, fault: Exception) -> None:
         self._log.error("the session failed", exc_info=fault)
         self._carry_out(self._session.refuse(FervorError("the service failed on this session; the fault is its own")))
-
-    async def _send_all(self) -> None:
-        try:
-            await self._outbox.send_all()
-        except Exception as fault:  # noqa: BLE001  # it costs this session, and no other
-            self._log.error("could not send", exc_info=fault)
-        self._leave_soon()
-
-    def _leave_soon(self) -> None:
-        """From here on the client has a little time to take what is left."""
-        if self._patience.when() is None:
-            self._patience.reschedule(self._loop.time() + CLOSE_GRACE_S)
-
-    def _look(self) -> None:
-        """Close a session that was not started in time, or that fell silent."""
-        settings, error = self._settings, FervorError
-        if self._session.state is SessionState.NEW:
-            error, until = StartTimeout, self._opened + settings.start_timeout_s
-            sentence = f"no session.start came for {settings.start_timeout_s:g} s"
-        else:
-            error, until = IdleTimeout, self._heard + settings.idle_timeout_s
-            sentence = f"nothing came for {settings.idle_timeout_s:g} s"
-        if until > self._loop.time():
-            self._watch = self._loop.call_at(until, self._look)
-        else:
-            self._carry_out(self._session.refuse(error(sentence)))
 
 
 def _topic(message: LeanEstimate | LeanEstimates) -> Hashable:
