@@ -70,12 +70,21 @@ async def test_prompt_tickets_run_at_once_with_what_waits():
     batcher, done = Batcher(engine), []
     work = tickets(engine, 600)
     for ticket in work[:3]:
-        batcher.submit(ticket, lambda ticket, outcome: done.append(ticket))
-    batcher.run([(ticket, lambda ticket, outcome: done.append(ticket)) for ticket in work[3:]])
-    assert [ticket.slot for ticket in done] == [*range(3, 600), 0, 1, 2]
+        batcher.submit(ticket, lambda ticket, outcome: done.append(ticket.slot))
+    outcomes = batcher.run(work[3:])
+    assert len(outcomes) == 597
+    assert done == [0, 1, 2]
     assert engine.sizes == [256, 256, 88]
     await asyncio.sleep(0)
     assert engine.sizes == [256, 256, 88]
+
+
+async def test_prompt_tickets_of_one_slot_run_in_their_order():
+    together, alone = Counting(3), Counting(3)
+    outcomes = Batcher(together).run(tickets(together, 3, frames=4))
+    expected = [alone.run([ticket])[0] for ticket in tickets(alone, 3, frames=4)]
+    assert [outcome.intensity for outcome in outcomes] == [outcome.intensity for outcome in expected]
+    assert together.sizes == [3, 3, 3, 3]
 
 
 async def test_a_slot_is_released_only_after_its_last_ticket():

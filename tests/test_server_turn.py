@@ -48,14 +48,14 @@ class Talk:
             events = self.session.refuse(error)
         self.carry(events)
 
-    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
-        ticket = self.session.prompt(frame, read)
-        self.in_blocks += ticket is not None
-        self.prompted += ticket is not None
-        return ticket
+    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+        tickets = self.session.prompt(message, poses)
+        self.in_blocks += len(tickets)
+        self.prompted += len(tickets)
+        return tickets
 
-    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
-        self.said += map(as_read, self.session.answer(ticket, outcome))
+    def answer(self, tickets: Sequence[Ticket], outcomes: Sequence[Outcome | EngineError]) -> None:
+        self.said += map(as_read, self.session.answer(tickets, outcomes))
 
     def carry(self, events) -> None:
         for event in events:

@@ -84,6 +84,19 @@ def test_late_frames_bring_no_work_and_say_so():
         assert (ticket.steps, ticket.pose, ticket.flags) == ((), None, ("late",))
 
 
+def test_a_frame_that_was_to_share_a_failed_answer_gets_or_fails_its_own():
+    for fails in (False, True):
+        body = Body("eve", 0, terms())
+        first, again = (body.plan(0, 0.0, pose()) for _ in range(2))
+        body.fail(first)
+        if fails:
+            body.fail(again)
+        else:
+            assert body.conclude(again, outcome()).flags == ("duplicate",)
+        assert body.in_flight == 0
+        assert answer(body, 1, 0.1).flags == ("reset",)
+
+
 def test_duplicates_get_the_same_answer_flagged():
     body = Body("eve", 0, terms())
     first = answer(body, 0, 0.0, intensity=0.7)

@@ -5,6 +5,7 @@ speak of "happiness" or "angry" are understood; a name that is none of these is 
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -72,18 +73,24 @@ def emotion_vector(label: str | Mapping[str, float] | None) -> npt.NDArray[np.fl
     Raises:
         InputError: an unknown name, or a probability that is negative or not finite.
     """
+    if label is None or isinstance(label, str):
+        return _one_hot(UNKNOWN if label is None else label).copy()
     vector = np.zeros(len(EMOTIONS), np.float64)  # [emotion]
-    if label is None or label == UNKNOWN:
-        return vector.astype(np.float32)
-    if isinstance(label, str):
-        vector[emotion_index(label)] = 1.0
-        return vector.astype(np.float32)
     for name, share in label.items():
         if not (np.isfinite(share) and share >= 0.0):
             raise InputError(f"emotion {name!r} has the probability {share}; expected a finite number from 0 to 1")
         vector[emotion_index(name)] += share
     total = float(vector.sum())
     return (vector / total if total > 1.0 else vector).astype(np.float32)
+
+
+@lru_cache(maxsize=256)
+def _one_hot(label: str) -> npt.NDArray[np.float32]:
+    """Of a plain label; some clients send theirs with every frame."""
+    vector = np.zeros(len(EMOTIONS), np.float32)  # [emotion]
+    if label != UNKNOWN:
+        vector[emotion_index(label)] = 1.0
+    return vector
 
 
 def dominant_emotion(vector: npt.NDArray[np.float32]) -> str:

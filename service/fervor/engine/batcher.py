@@ -8,7 +8,7 @@ measured to be 8-20 % faster than a thread.
 import asyncio
 import logging
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -57,16 +57,39 @@ class Batcher:
         self.depth += 1
         self._schedule()
 
-    def run(self, prompt: Sequence[tuple[Ticket, Deliver]] = ()) -> None:
+    def run(self, prompt: Sequence[Ticket] = ()) -> list[Outcome | EngineError]:
         """Run what waits without another turn of the loop; for who has just submitted all that it had.
 
         Args:
-            prompt: more tickets, that need not wait: of slots that have none waiting, at most one each.
+            prompt: tickets that need not wait, of slots that have none waiting; those of one slot in their order.
+
+        Returns:
+            the outcomes of these.
         """
-        for first in range(0, len(prompt), MOST_TICKETS):
-            self._run(prompt[first : first + MOST_TICKETS])
+        outcomes: list[Outcome | EngineError] = []
+        if len({ticket.slot for ticket in prompt}) == len(prompt):
+            for first in range(0, len(prompt), MOST_TICKETS):
+                outcomes += self._run(prompt[first : first + MOST_TICKETS])
+        else:
+            outcomes = self._run_in_waves(prompt)
         if self._waiting and not prompt:
             self._run()
+        return outcomes
+
+    def _run_in_waves(self, prompt: Sequence[Ticket]) -> list[Outcome | EngineError]:
+        """As `run`, of tickets of which some share a slot: one of each slot at a time."""
+        waves: list[list[int]] = []  # places in `prompt`
+        taken: Counter[int] = Counter()
+        for place, ticket in enumerate(prompt):
+            number = taken[ticket.slot]
+            taken[ticket.slot] += 1
+            if number == len(waves):
+                waves.append([])
+            waves[number].append(place)
+        outcomes: dict[int, Outcome | EngineError] = {}
+        for wave in waves:
+            outcomes.update(zip(wave, self.run([prompt[place] for place in wave]), strict=True))
+        return [outcomes[place] for place in range(len(prompt))]
 
     def release(self, slot: int) -> None:
         """Free a slot once its tickets have run."""
@@ -81,16 +104,15 @@ class Batcher:
             self._since = time.perf_counter()
             asyncio.get_running_loop().call_soon(self._run)
 
-    def _run(self, prompt: Sequence[tuple[Ticket, Deliver]] = ()) -> None:
+    def _run(self, prompt: Sequence[Ticket] = ()) -> Sequence[Outcome | EngineError]:
         """One batch: prompt tickets, and the oldest ticket of every slot that has one waiting."""
+        self._scheduled = False
         if not self._waiting:
             if not prompt:
-                self._scheduled = False
-                return  # `run` was first
+                return ()  # `run` was first
             self._since = time.perf_counter()
-        batch = [*prompt, *[self._take(slot) for slot in list(self._waiting)[: MOST_TICKETS - len(prompt)]]]
-        self._scheduled = False
-        tickets = [ticket for ticket, _ in batch]
+        batch = [self._take(slot) for slot in list(self._waiting)[: MOST_TICKETS - len(prompt)]]
+        tickets = [*prompt, *[ticket for ticket, _ in batch]]
         start, since = time.perf_counter(), self._since
         outcomes = self._outcomes(tickets)
         run = Run(len(tickets), time.perf_counter() - start, start - since)
@@ -99,7 +121,7 @@ class Batcher:
             self.engine.release(slot)
         if self._waiting:
             self._schedule()
-        for (ticket, deliver), outcome in zip(batch, outcomes, strict=True):
+        for (ticket, deliver), outcome in zip(batch, outcomes[len(prompt) :], strict=True):
             try:
                 deliver(ticket, outcome)
             except Exception:  # one session's fault must not cost the others their answers
@@ -107,6 +129,7 @@ class Batcher:
                 log.exception(sentence, ticket.seq, ticket.body, extra={"body": ticket.body})
         for watcher in self._watchers:
             watcher(run)
+        return outcomes[: len(prompt)]
 
     def _outcomes(self, tickets: list[Ticket]) -> list[Outcome] | list[EngineError] | list[Outcome | EngineError]:
         try:

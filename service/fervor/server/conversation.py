@@ -98,24 +98,25 @@ class Conversation(Life):
         if self._session.state is not SessionState.CLOSED:
             self._act_on(message, raw, poses)
 
-    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
+    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """See `Taker`."""
-        if self._leaving or not self._pace.has_room:
-            return None
-        ticket = self._session.prompt(frame, read)
-        if ticket is not None:
+        if self._leaving or not self._pace.has_room(len(poses)):
+            return ()
+        tickets = self._session.prompt(message, poses)
+        if tickets:
             self._in_turn -= 1
-            self._pace.take(1, self._heard)
-            if ticket.flags:
-                self._note_gap(ticket)
-        return ticket
+            self._pace.take(len(tickets), self._heard)
+            for ticket in tickets:
+                if ticket.flags:
+                    self._note_gap(ticket)
+        return tickets
 
-    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
+    def answer(self, tickets: Sequence[Ticket], outcomes: Sequence[Outcome | EngineError]) -> None:
         """See `Taker`."""
         if self._room is not None:
             self._make_room()
         try:
-            for said in self._session.answer(ticket, outcome):
+            for said in self._session.answer(tickets, outcomes):
                 self._say(said)
             self._end_if_slow()
         except Exception as fault:  # noqa: BLE001  # as below

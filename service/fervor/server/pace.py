@@ -13,10 +13,9 @@ class Pace:
         self._left = self._most
         self._then = 0.0
 
-    @property
-    def has_room(self) -> bool:
-        """Whether a frame could be taken if no time had passed."""
-        return self._left >= 1.0
+    def has_room(self, frames: int) -> bool:
+        """Whether so many could be taken if no time had passed."""
+        return frames <= self._left
 
     def take(self, frames: int, now: float) -> None:
         """Use up allowance for `frames` at `now` (seconds, any steady clock).

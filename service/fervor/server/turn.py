@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from itertools import islice
 from typing import NamedTuple, Protocol
 
-from fervor.engine.batcher import Batcher, Deliver
+from fervor.engine.batcher import Batcher
 from fervor.errors import EngineError
 from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.session.events import Outcome, Ticket
@@ -33,11 +33,11 @@ class Taker(Protocol):
     def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
         """Do what the message asks; of raw frames, the poses were read already. Never raises."""
 
-    def prompt(self, frame: RawFrame, read: Read) -> Ticket | None:
-        """The ticket of a frame about which nothing is unusual; None, having done nothing: `take` is to see it."""
+    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+        """The tickets of frames about which nothing is unusual; none, having done nothing: `take` is to see them."""
 
-    def answer(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
-        """Answer a frame whose ticket `prompt` gave; before anything else is taken. Never raises."""
+    def answer(self, tickets: Sequence[Ticket], outcomes: Sequence[Outcome | EngineError]) -> None:
+        """Answer a message whose tickets `prompt` gave; before anything else is taken. Never raises."""
 
 
 class Turn:
@@ -70,19 +70,19 @@ class Turn:
 
     def _pass(self, ready: Sequence["_Ready"]) -> list["_Ready"]:
         """Take messages and run what they bring; returns those behind a prompt frame of the same session."""
-        prompt: list[tuple[Ticket, Deliver]] = []
-        busy: set[Taker] = set()
+        prompt: dict[Taker, Sequence[Ticket]] = {}
         later = []
         for each in ready:
             taker, message, raw, poses = each
-            if taker in busy:
+            if taker in prompt:
                 later.append(each)
-            elif isinstance(raw, RawFrame) and poses and (ticket := taker.prompt(raw, poses[0])) is not None:
-                prompt.append((ticket, taker.answer))
-                busy.add(taker)
+            elif raw and poses and (tickets := taker.prompt(raw, poses)):
+                prompt[taker] = tickets
             else:
                 taker.take(message, raw, poses)
-        self._batcher.run(prompt)
+        outcomes = iter(self._batcher.run([ticket for tickets in prompt.values() for ticket in tickets]))
+        for taker, tickets in prompt.items():
+            taker.answer(tickets, list(islice(outcomes, len(tickets))))
         return later
 
 

@@ -109,7 +109,7 @@ class Answers:
         self._newest.pop(seq, None)
 
     def _conclude(self, seq: int) -> None:
-        left = self._under_way.pop(seq) - 1
+        left = self._under_way.pop(seq, 1) - 1  # 1: of a frame that was to share an answer which never came
         if left:
             self._under_way[seq] = left
 
