@@ -123,7 +123,7 @@ def told(script):
         yield frames[0] if len(frames) == 1 else {"type": "frames", "frames": frames}
 
 
-@settings(max_examples=150)
+@settings(max_examples=150, deadline=None)
 @given(start=STARTS, script=st.lists(MESSAGES, max_size=30))
 def test_prompt_frames_come_to_what_others_come_to(start, script):
     prompt, plain = (Service(start, promptly=promptly) for promptly in (True, False))
