@@ -62,22 +62,32 @@ def advance(timeline: Timeline | None, time: float, *, rate_hz: float) -> Advanc
     """The steps that a pose at `time` (seconds) brings to a grid of `rate_hz`; a late one brings none."""
     if timeline is None:
         return begin(time)
-    gap = time - timeline.last
-    if gap > HOLD_S + SAME_INSTANT_S:
+    last = timeline.last
+    gap = time - last
+    if not 0.0 < gap <= HOLD_S + SAME_INSTANT_S:
+        return _apart(timeline, time, gap)
+    held = gap > INTERPOLATE_S + SAME_INSTANT_S
+    origin, index, until = timeline.origin, timeline.steps, time + SAME_INSTANT_S
+    instants: list[Instant] = []
+    while (at := origin + index / rate_hz) <= until:
+        inside = held and at < time - SAME_INSTANT_S
+        instants.append(Instant(index, at, min((at - last) / gap, 1.0), inside))
+        index += 1
+    flags: tuple[TimelineFlag, ...] = ()
+    if held:
+        flags = ("held",)
+    elif len(instants) != 1:
+        flags = ("interpolated",) if instants else ("between_steps",)
+    return Advance(Timeline(origin, time, index), tuple(instants), flags)
+
+
+def _apart(timeline: Timeline, time: float, gap: float) -> Advance:
+    """A pose so far from the one before it, or before that, that nothing lies between."""
+    if gap > 0.0:
         return begin(time, "gap_reset")
     if gap < -HOLD_S:
         return begin(time, "clock_reset")
-    if gap <= 0.0:
-        return Advance(timeline, flags=("late",))
-    held = gap > INTERPOLATE_S + SAME_INSTANT_S
-    origin, index = timeline.origin, timeline.steps
-    instants: list[Instant] = []
-    while (at := origin + index / rate_hz) <= time + SAME_INSTANT_S:
-        arrived = at >= time - SAME_INSTANT_S
-        fraction = min((at - timeline.last) / gap, 1.0)
-        instants.append(Instant(index, at, fraction, held and not arrived))
-        index += 1
-    return Advance(Timeline(origin, time, index), tuple(instants), _describe(instants, held=held))
+    return Advance(timeline, flags=("late",))
 
 
 def count_frame(timeline: Timeline | None, time: float) -> Advance:
@@ -86,11 +96,3 @@ def count_frame(timeline: Timeline | None, time: float) -> Advance:
         return begin(time)
     instant = Instant(timeline.steps, time, 1.0, held=False)
     return Advance(Timeline(timeline.origin, time, timeline.steps + 1), (instant,))
-
-
-def _describe(instants: list[Instant], *, held: bool) -> tuple[TimelineFlag, ...]:
-    if held:
-        return ("held",)
-    if not instants:
-        return ("between_steps",)
-    return ("interpolated",) if len(instants) > 1 else ()
