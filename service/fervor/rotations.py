@@ -36,9 +36,10 @@ def _join(*parts: Any) -> npt.NDArray[Any]:
 
 def dot(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Any:
     """Dot products [...] over the last axis, summed in one order: np.sum's order depends on the memory layout."""
-    total = a[..., 0] * b[..., 0]
-    for index in range(1, a.shape[-1]):
-        total = total + a[..., index] * b[..., index]
+    products = a * b
+    total = products[..., 0] + products[..., 1]
+    for index in range(2, products.shape[-1]):
+        total += products[..., index]
     return total
 
 
@@ -59,6 +60,9 @@ def normalise(q: npt.NDArray[F]) -> npt.NDArray[F]:
     """Quaternions [..., 4] at unit length; a zero quaternion, which is no rotation, becomes the identity."""
     norm = length(q)
     zero = norm == 0.0
+    if not zero.any():
+        unit: npt.NDArray[F] = np.divide(q, norm[..., None], order="C")
+        return unit
     x, y, z, w = _parts(q)
     divisor = np.where(zero, norm.dtype.type(1.0), norm)
     return _join(x / divisor, y / divisor, z / divisor, np.where(zero, norm.dtype.type(1.0), w / divisor))
@@ -240,9 +244,15 @@ def align_hemisphere(q: npt.NDArray[F], reference: npt.NDArray[F]) -> npt.NDArra
     return np.where(flip[..., None], -q, q)
 
 
+def _turned_to(q: npt.NDArray[F], reference: npt.NDArray[F]) -> npt.NDArray[F]:
+    """`align_hemisphere`, or `q` itself where none of it has to be turned, as is usual."""
+    flip = dot(q, reference) < 0.0
+    return np.where(flip[..., None], -q, q) if flip.any() else q
+
+
 def angle_between(a: npt.NDArray[F], b: npt.NDArray[F]) -> npt.NDArray[F]:
     """Angle [...] from 0 to π of the turn between unit quaternions a and b, exact for small and large angles."""
-    b = align_hemisphere(b, a)
+    b = _turned_to(b, a)
     angle: npt.NDArray[F] = 4.0 * np.arctan2(length(a - b), length(a + b))
     return angle
 
@@ -255,16 +265,20 @@ def slerp(a: npt.NDArray[F], b: npt.NDArray[F], fraction: npt.NDArray[F] | float
         b: unit quaternions [..., 4]; -b gives the same way.
         fraction: 0 (exactly a) to 1 (exactly b or -b, bit for bit); broadcast against the leading axes.
     """
-    b = align_hemisphere(b, a)
+    b = _turned_to(b, a)
     share = np.asarray(fraction, a.dtype)
+    rest = 1.0 - share
     angle = 2.0 * np.arctan2(length(a - b), length(a + b))  # between the 4-vectors, at most π/2
     near = angle < 1e-6  # the sines cancel there: linear is exact
-    safe = np.where(near, angle.dtype.type(1.0), angle)
+    some_near = near.any()
+    safe = np.where(near, angle.dtype.type(1.0), angle) if some_near else angle
     sine = np.sin(safe)
-    left = np.where(near, 1.0 - share, np.sin((1.0 - share) * safe) / sine)[..., None]
-    right = np.where(near, share, np.sin(share * safe) / sine)[..., None]
-    way = normalise(left * a + right * b)
-    return np.where(share[..., None] == 0.0, a, np.where(share[..., None] == 1.0, b, way))
+    left, right = np.sin(rest * safe) / sine, np.sin(share * safe) / sine
+    if some_near:
+        left, right = np.where(near, rest, left), np.where(near, share, right)
+    way = normalise(left[..., None] * a + right[..., None] * b)
+    start, end = share == 0.0, share == 1.0
+    return np.where(start[..., None], a, np.where(end[..., None], b, way)) if (start | end).any() else way
 
 
 def mean(q: npt.NDArray[F]) -> npt.NDArray[F]:
