@@ -28,9 +28,10 @@ SHORTEST = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
-    """Which source joints make up each rig joint. Paths are padded with the index one past the last used joint."""
+    """Which source joints make up each rig joint. Paths are padded with the index of the last used joint."""
 
-    used: npt.NDArray[np.intp]  # [used] the source joints that matter
+    used: npt.NDArray[np.intp]  # [used] the source joints that matter; the last one stands for the identity
+    direct: bool  # each rig joint is one source joint as it is
     up: npt.NDArray[np.intp]  # [step, 13] used joints to multiply, from below the common ancestor to P; then inverted
     down: npt.NDArray[np.intp]  # [step, 13] likewise to J
     sees: npt.NDArray[np.bool_]  # [13]
@@ -62,35 +63,40 @@ def adapt(
             f"got rotations {list(rotations.shape)} and a mask {list(observed.shape)}"
         )
     plan = _plan(skeleton, axes)
-    parts, tracked = _clean(rotations[..., plan.used, :], observed[..., plan.used])
-    turn, seen = _along(plan.down, parts, tracked)
+    units, tracked, whole = _clean(rotations.take(plan.used, axis=-2), observed.take(plan.used, axis=-1))
+    if plan.direct and whole:  # nothing is to be multiplied
+        return units.take(plan.down[0], axis=-2), tracked.take(plan.down[0], axis=-1)
+    turn, seen = _along(plan.down, units, tracked)
     if len(plan.up):
-        (x, y, z, w), seen_back = _along(plan.up, parts, tracked)
+        (x, y, z, w), seen_back = _along(plan.up, units, tracked)
         turn, seen = product((-x, -y, -z, w), turn), seen & seen_back
     if not plan.aligned:
-        turn = product(product(plan.above.astype(parts.dtype), turn), plan.below.astype(parts.dtype))
+        turn = product(product(plan.above.astype(units.dtype), turn), plan.below.astype(units.dtype))
     seen = seen & plan.sees
-    local = identity(seen.shape, parts.dtype)
+    local = identity(seen.shape, units.dtype)
     for index, part in enumerate(turn):
         np.copyto(local[..., index], part, where=seen)
     return local, seen
 
 
-def _clean(rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[F], npt.NDArray[np.bool_]]:
-    """Unit rotations as components [4, ..., joint + 1], and where they were tracked; the last joint is the identity.
+def _clean(
+    rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_]
+) -> tuple[npt.NDArray[F], npt.NDArray[np.bool_], bool]:
+    """Unit rotations [..., used, 4] in place, where they were tracked [..., used], and whether all were.
 
-    Several products follow, and numpy is fastest where each component is an array of its own.
+    The last one becomes the identity, as do the untracked.
     """
+    rotations[..., -1, :], observed[..., -1] = IDENTITY, True
     with np.errstate(over="ignore", invalid="ignore"):  # numbers too large to be rotations are untracked
         size = length(rotations)
-        tracked = observed & (size >= SHORTEST) & np.isfinite(size)
-    parts = np.zeros((4, *tracked.shape[:-1], tracked.shape[-1] + 1), rotations.dtype)
-    parts[3] = 1.0
-    seen = np.ones(parts.shape[1:], np.bool_)
-    seen[..., :-1] = tracked
-    for index in range(4):
-        np.divide(rotations[..., index], size, out=parts[index, ..., :-1], where=tracked)
-    return parts, seen
+        tracked = observed & (size >= SHORTEST) & (size < np.inf)
+    whole = bool(tracked.all())
+    if whole:
+        rotations /= size[..., None]
+    else:
+        np.divide(rotations, size[..., None], out=rotations, where=tracked[..., None])
+        rotations[~tracked] = IDENTITY
+    return rotations, tracked, whole
 
 
 def check_axes(skeleton: Skeleton, axes: Axes) -> None:
@@ -104,14 +110,19 @@ def check_axes(skeleton: Skeleton, axes: Axes) -> None:
 
 
 def _along(
-    path: npt.NDArray[np.intp], parts: npt.NDArray[F], tracked: npt.NDArray[np.bool_]
+    path: npt.NDArray[np.intp], units: npt.NDArray[F], tracked: npt.NDArray[np.bool_]
 ) -> tuple[Iterable[Any], npt.NDArray[np.bool_]]:
     """Products of rotations along paths [step, 13], as components, and whether all of a path was tracked."""
-    turn: Iterable[Any] = parts[..., path[0]]
-    seen = tracked[..., path[0]]
+    turn: Iterable[Any] = _components(units, path[0])
+    seen = tracked.take(path[0], axis=-1)
     for step in path[1:]:
-        turn, seen = product(turn, parts[..., step]), seen & tracked[..., step]
+        turn, seen = product(turn, _components(units, step)), seen & tracked.take(step, axis=-1)
     return turn, seen
+
+
+def _components(units: npt.NDArray[F], joints: npt.NDArray[np.intp]) -> npt.NDArray[F]:
+    """Of these joints [13] as arrays of their own [4, ..., 13]: with these, numpy multiplies fastest."""
+    return np.ascontiguousarray(np.moveaxis(units.take(joints, axis=-2), -1, 0))
 
 
 @lru_cache(maxsize=64)
@@ -133,12 +144,14 @@ def _plan(skeleton: Skeleton, axes: Axes) -> _Plan:
         ups.append(up)
         downs.append(down)
     used = sorted({joint for path in (*ups, *downs) for joint in path})
+    aligned = bool((skeleton.bind == IDENTITY).all())
     return _Plan(
-        used=np.array(used, np.intp),
+        used=np.array([*used, 0], np.intp),
+        direct=aligned and not any(ups) and all(len(path) == 1 for path in downs),
         up=_padded(ups, used),
         down=_padded(downs, used) if any(downs) else np.full((1, len(downs)), len(used), np.intp),
         sees=np.array(skeleton.sees),
-        aligned=bool((skeleton.bind == IDENTITY).all()),
+        aligned=aligned,
         above=np.ascontiguousarray(skeleton.bind[list(PARENT_SEGMENT)].T),
         below=np.ascontiguousarray(conjugate(skeleton.bind[list(CHILD_SEGMENT)]).T),
     )
