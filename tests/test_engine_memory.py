@@ -1,7 +1,6 @@
-"""A batch's memory: what it moves shows in the slots once all is stored, whether it works on copies or not."""
+"""A batch's memory: what it moves shows in the slots, or all of it is undone."""
 
 import numpy as np
-import pytest
 
 from bodies import model
 from fervor.engine.memory import BatchMemory
@@ -20,39 +19,53 @@ def filled() -> Slots:
 
 
 def contents(slots: Slots) -> list[bytes]:
-    arrays = (*slots.states.values(), slots.intensity, slots.by_emotion)
-    return [array.tobytes() for array in arrays]
+    everyone = np.arange(slots.capacity)
+    return [slots.read(everyone).tobytes(), *(state.tobytes() for state in slots.states.values())]
 
 
-@pytest.mark.parametrize("copied", [False, True])
-def test_lanes_are_those_of_the_tickets_slots(copied: bool) -> None:
+def test_lanes_are_those_of_the_tickets_slots() -> None:
     slots = filled()
-    states = BatchMemory(slots, ROWS, copied=copied).lanes(TICKETS, LANE)
-    for name, state in states.items():
+    memory = BatchMemory(slots, ROWS)
+    for name, state in memory.lanes(memory.place(TICKETS, LANE)).items():
         assert np.array_equal(state, slots.states[name][[4, 4, 2], [0, 1, 1]])
         state[:] = 0.0  # a copy: the slots keep theirs
         assert slots.states[name][4, 0].any()
 
 
-@pytest.mark.parametrize("copied", [False, True])
-def test_nothing_shows_before_it_is_stored_and_then_all_does(copied: bool) -> None:
+def step(memory: BatchMemory, tickets: np.ndarray, lane: np.ndarray, restart: np.ndarray | None = None) -> None:
+    """A step that adds one to the states of these lanes."""
+    at = memory.place(tickets, lane)
+    memory.move(at, {name: state + 1.0 for name, state in memory.lanes(at, restart).items()})
+
+
+def test_steps_go_on_from_one_another() -> None:
     slots, untouched = filled(), filled()
-    memory = BatchMemory(slots, ROWS, copied=copied)
-    moved = {name: state + 1.0 for name, state in memory.lanes(TICKETS, LANE).items()}
-    memory.move(TICKETS, LANE, moved)
-    memory.intensity[:] = 0.5
-    assert contents(slots) == contents(untouched)
+    memory = BatchMemory(slots, ROWS)
+    step(memory, TICKETS, LANE)
+    step(memory, TICKETS[:1], LANE[:1])
+    memory.said[:, 0] = 0.5
     memory.store()
     for name, state in untouched.states.items():
         state[[4, 4, 2], [0, 1, 1]] += 1.0
+        state[4, 0] += 1.0
         assert np.array_equal(slots.states[name], state)
-    assert np.flatnonzero(slots.intensity == 0.5).tolist() == [1, 2, 4]
+    assert np.flatnonzero(slots.read(np.arange(6))["said"][:, 0] == 0.5).tolist() == [1, 2, 4]
 
 
-def test_on_copies_a_second_step_goes_on_from_the_first() -> None:
+def test_lanes_that_restart_begin_from_zero() -> None:
     slots = filled()
-    memory = BatchMemory(slots, ROWS, copied=True)
-    memory.move(TICKETS, LANE, {name: state + 1.0 for name, state in memory.lanes(TICKETS, LANE).items()})
-    again = memory.lanes(TICKETS, LANE)
-    for name, state in again.items():
-        assert np.array_equal(state, slots.states[name][[4, 4, 2], [0, 1, 1]] + 1.0)
+    memory = BatchMemory(slots, ROWS)
+    states = memory.lanes(memory.place(TICKETS, LANE), np.array([1]))
+    assert all(not state[1].any() and state[0].any() and state[2].any() for state in states.values())
+
+
+def test_what_is_undone_leaves_no_trace() -> None:
+    slots, untouched = filled(), filled()
+    memory = BatchMemory(slots, ROWS)
+    step(memory, TICKETS, LANE)
+    step(memory, TICKETS, LANE, np.array([0, 2]))
+    step(memory, TICKETS[1:], LANE[1:])
+    memory.said[:], memory.records["pose"] = 0.5, 0.25
+    assert contents(slots) != contents(untouched)
+    memory.undo()
+    assert contents(slots) == contents(untouched)

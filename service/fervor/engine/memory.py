@@ -1,12 +1,14 @@
-"""What a batch changes, kept apart from the slots until all of it succeeded."""
+"""What a batch changes: all of it, or nothing."""
 
 import numpy as np
 import numpy.typing as npt
 
 from fervor.engine.history import History
+from fervor.engine.posing import Poses
 from fervor.engine.slots import Slots
 from fervor.model import Floats
 from fervor.session.lanes import LANES
+from fervor.skeletons.rig import UPPER_BODY
 
 States = dict[str, Floats]  # name → [row, *shape]
 
@@ -16,63 +18,84 @@ Index = npt.NDArray[np.intp]
 class BatchMemory:
     """The memory of a batch's bodies, by ticket.
 
-    Where every body takes one step at most, states are read from the slots and written back once; only where one takes
-    several does the batch work on copies.
+    Records are copies, written back by `store`. States are read from the slots and put there with every step; `undo`
+    takes that back.
     """
 
-    def __init__(self, slots: Slots, rows: Index, *, copied: bool) -> None:
+    def __init__(self, slots: Slots, rows: Index) -> None:
         """Begin with what the slots hold.
 
         Args:
             slots: of the engine.
             rows: [ticket] slot.
-            copied: whether a lane's states are put more than once before `store`.
         """
         self._slots = slots
         self._rows = rows
-        self._places = np.arange(len(rows)) if copied else rows  # [ticket] where its states stand in `_states`
-        self._states = {name: state[rows] for name, state in slots.states.items()} if copied else slots.states
-        self._copied = copied
-        self._moved: list[tuple[Index, States]] = []  # rows of flattened slots, and what becomes of them
+        self._before: list[tuple[Index, States]] = []  # lanes as they were, in the order in which they changed
+        self.records = slots.read(rows)  # [ticket]
+        self.said: npt.NDArray[np.float64] = self.records["said"]  # [ticket, 1 + emotion], a view
         self.histories = self._histories()
-        self.intensity = slots.intensity[rows]  # [ticket]
-        self.by_emotion = slots.by_emotion[rows]  # [ticket, emotion]
 
     def _histories(self) -> dict[int, History]:
         """Ticket → last poses, of bodies with a window."""
         kept = self._slots.histories
         return {at: kept[slot] for at, slot in enumerate(self._rows.tolist()) if slot in kept} if kept else {}
 
-    def lanes(self, tickets: Index, lane: Index) -> States:
-        """Copies of the states of these lanes, both [row]: name → [row, *shape]."""
-        at = self._places[tickets] * LANES + lane
-        return {name: _flat(state).take(at, axis=0) for name, state in self._states.items()}
+    def place(self, tickets: Index, lane: Index) -> Index:
+        """Where the states of these lanes of tickets, both [row], are kept: see `Slots.lanes`."""
+        return self._rows.take(tickets) * LANES + lane
 
-    def move(self, tickets: Index, lane: Index, states: States) -> None:
-        """What a step made of these lanes, both [row]."""
-        at = self._places[tickets] * LANES + lane
-        if self._copied:
-            _put(self._states, at, states)
-        else:
-            self._moved.append((at, states))
+    def lanes(self, at: Index, restart: Index | None = None) -> States:
+        """Copies of the states of lanes, to be followed by `move`.
+
+        Args:
+            at: [row] which, from `place`.
+            restart: those of the rows that begin from zero.
+        """
+        states = {name: lanes.take(at, axis=0) for name, lanes in self._slots.lanes.items()}
+        if restart is not None:
+            self._before.append((at[restart], {name: state[restart] for name, state in states.items()}))
+            for state in states.values():
+                state[restart] = 0.0
+        self._before.append((at, states))
+        return states
+
+    def move(self, at: Index, states: States) -> None:
+        """What a step made of these lanes [row]."""
+        self._slots.put(at, states)
+
+    def undo(self) -> None:
+        """Make the slots hold what they held."""
+        while self._before:
+            self._slots.put(*self._before.pop())
+
+    def keep(
+        self,
+        posed: Index | None,
+        new: Poses,
+        *,
+        jumps: npt.NDArray[np.int64] | None,
+        hinges: npt.NDArray[np.float64] | None,
+    ) -> None:
+        """Take the newest poses into the records of those tickets that have one.
+
+        Args:
+            posed: those tickets, by number; None for all.
+            new: the poses, [ticket].
+            jumps: [ticket, joint] frames rejected in a row; None where no source is noisy.
+            hinges: [ticket, limb, bone, 3]; None where no sensor has any.
+        """
+        rows = slice(None) if posed is None else posed
+        records = self.records
+        records["pose"][rows], records["observed"][rows] = new.rotations[rows], new.observed[rows]
+        records["seen"][rows] = np.add.reduce(new.observed[rows].take(UPPER_BODY, axis=1), axis=1)
+        if jumps is not None:
+            records["jumps"][rows] = jumps[rows]
+        if hinges is not None:
+            records["hinges"][rows] = hinges[rows]
 
     def store(self) -> None:
-        """Make it what the slots hold."""
-        if self._copied:
-            for name, state in self._states.items():
-                self._slots.states[name][self._rows] = state
-        for at, states in self._moved:
-            _put(self._slots.states, at, states)
+        """Make records and histories what the slots hold."""
+        self._slots.write(self._rows, self.records)
         for ticket, history in self.histories.items():
             self._slots.histories[int(self._rows[ticket])] = history
-        self._slots.intensity[self._rows], self._slots.by_emotion[self._rows] = self.intensity, self.by_emotion
-
-
-def _flat(state: Floats) -> Floats:
-    """States [place, lane, *shape] as [place · lane, *shape], a view."""
-    return state.reshape(-1, *state.shape[2:])
-
-
-def _put(states: States, at: Index, values: States) -> None:
-    for name, state in states.items():
-        _flat(state)[at] = values[name]

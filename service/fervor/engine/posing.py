@@ -4,14 +4,13 @@ Elementwise throughout: no row can depend on its neighbours in the batch.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from fervor.rotations import IDENTITY, angle_between, slerp
-from fervor.session.events import Source, Ticket
+from fervor.rotations import IDENTITY, angle_between, dot, slerp
+from fervor.session.events import Pose, Source, Ticket
 from fervor.skeletons.adapter import adapt
 from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.positions import local_from_positions
@@ -21,12 +20,14 @@ from fervor.skeletons.skeleton import Skeleton
 JUMP_RAD = np.radians(120.0)
 """A noisy sensor's joint that turns further than this in one frame has flipped, not moved."""
 
+_SURELY_NEAR = np.cos(JUMP_RAD / 2.0) + 1e-3
+"""Quaternions with a greater product are nearer than that, whatever the last bits."""
+
 JUMPS_BELIEVED = 5
 """A rotation that was rejected this often in a row is believed: the sensor settled there."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Poses:
+class Poses(NamedTuple):
     """Canonical poses of a batch."""
 
     rotations: npt.NDArray[np.float64]  # [row, joint, 4] xyzw
@@ -38,33 +39,40 @@ class Poses:
 
 
 def adapt_all(
-    tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64], slots: npt.NDArray[np.intp]
+    tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]
 ) -> tuple[Poses, npt.NDArray[np.float64] | None]:
     """The tickets' poses in the rig C13; tickets of one source are adapted in one go.
 
     Args:
         tickets: the batch.
-        hinges: [slot, limb, bone, 3] what landmark sensors remember of each body's limbs.
-        slots: [row] of the tickets.
+        hinges: [row, limb, bone, 3] what landmark sensors remember of each body's limbs.
 
     Returns:
         the poses, and the hinges [row, limb, bone, 3] after them; None where nobody has such a sensor.
     """
+    poses = [ticket.pose for ticket in tickets if ticket.pose is not None]
+    source = tickets[0].source
+    strange = [ticket for ticket in tickets if ticket.source is not source]
+    if len(poses) == len(tickets) and not strange and isinstance(source.skeleton, Skeleton):
+        return Poses(*adapt(source.skeleton, *_stacked(poses), axes=source.axes)), None
+    return _adapt_by_source(tickets, hinges)
+
+
+def _adapt_by_source(
+    tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]
+) -> tuple[Poses, npt.NDArray[np.float64] | None]:
+    """As `adapt_all`, of any sources."""
     by_source: dict[Source, list[int]] = {}
     for row, ticket in enumerate(tickets):
         if ticket.pose is not None:
             by_source.setdefault(ticket.source, []).append(row)
-    if len(by_source) == 1:
-        ((source, rows),) = by_source.items()
-        if len(rows) == len(tickets) and isinstance(source.skeleton, Skeleton):
-            return Poses(*adapt(source.skeleton, *_stacked(tickets, rows), axes=source.axes)), None
     rotations = np.tile(IDENTITY, (len(tickets), len(JOINTS), 1))
     observed = np.zeros((len(tickets), len(JOINTS)), np.bool_)
     after: npt.NDArray[np.float64] | None = None
     for source, rows in by_source.items():
-        joints, seen = _stacked(tickets, rows)
+        joints, seen = _stacked([pose for row in rows if (pose := tickets[row].pose) is not None])
         if isinstance(source.skeleton, Landmarks):
-            after = hinges[slots] if after is None else after
+            after = hinges.copy() if after is None else after
             rotations[rows], observed[rows], after[rows] = local_from_positions(
                 source.skeleton, joints, seen, after[rows]
             )
@@ -73,13 +81,15 @@ def adapt_all(
     return Poses(rotations, observed), after
 
 
-def _stacked(tickets: Sequence[Ticket], rows: Sequence[int]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-    """The poses of these tickets: joints [row, joint, 3 or 4], observed [row, joint]."""
-    poses = [pose for row in rows if (pose := tickets[row].pose) is not None]
+def _stacked(poses: Sequence[Pose]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+    """Poses of one source together: joints [row, joint, 3 or 4], observed [row, joint]."""
     block = poses[0].block
-    if block is not None and all(pose.block is block for pose in poses):  # as most of a turn's are
-        places = [pose.row for pose in poses]
-        return block.joints[places], block.observed[places]
+    if block is not None:
+        places = [pose.row for pose in poses if pose.block is block]
+        if len(places) == len(poses):  # as most of a turn's are
+            if places == [*range(len(block.joints))]:
+                return block.joints, block.observed
+            return block.joints[places], block.observed[places]
     return np.stack([pose.joints for pose in poses]), np.stack([pose.observed for pose in poses])
 
 
@@ -97,10 +107,11 @@ def reject_jumps(
     Returns:
         the poses with flipped joints unobserved, the new counts, and which joints [row, joint] were rejected.
     """
-    if not noisy.any():
+    comparable = noisy[:, None] & new.observed & (old.observed | (jumps > 0))
+    near = np.abs(dot(old.rotations, new.rotations)) > _SURELY_NEAR  # that's sooner known than the angle
+    if not (comparable & ~near).any():
         return new, np.where(new.observed, 0, jumps), np.zeros(jumps.shape, np.bool_)
-    comparable = new.observed & old.observed | new.observed & (jumps > 0)
-    far = noisy[:, None] & comparable & (angle_between(old.rotations, new.rotations) > JUMP_RAD)
+    far = comparable & (angle_between(old.rotations, new.rotations) > JUMP_RAD)
     rejected = far & (jumps + 1 < JUMPS_BELIEVED)
     counts = np.where(rejected, jumps + 1, np.where(new.observed, 0, jumps))
     return Poses(new.rotations, new.observed & ~rejected), counts, rejected
@@ -128,15 +139,20 @@ def between(
         rotations float32 [row, joint, 4] and mask float32 [row, joint]. Between two poses a joint counts as observed
         where both show it.
     """
-    arrived = fraction >= 1.0
-    if arrived.all() and not held.any():  # as of a sensor that keeps the grid's time
-        return new.rotations.astype(np.float32), new.observed.astype(np.float32)
+    there = fraction >= 1.0
     rotations, observed = new.rotations.astype(np.float32), new.observed.copy()
-    on_the_way = np.flatnonzero(~arrived & ~held)
+    on_the_way = np.flatnonzero(~there & ~held)
+    if len(on_the_way) == len(fraction):
+        observed &= old.observed
+        return slerp(old.rotations, new.rotations, fraction[:, None]).astype(np.float32), observed.astype(np.float32)
     if len(on_the_way):
         before, after = old.rows(on_the_way), new.rows(on_the_way)
-        share = np.broadcast_to(fraction[on_the_way, None], after.observed.shape)
-        rotations[on_the_way] = slerp(before.rotations, after.rotations, share)
+        rotations[on_the_way] = slerp(before.rotations, after.rotations, fraction[on_the_way, None])
         observed[on_the_way] &= before.observed
     rotations[held], observed[held] = old.rotations[held], False
     return rotations, observed.astype(np.float32)
+
+
+def arrived(new: Poses) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """`between` at the poses that came, for the whole batch."""
+    return new.rotations.astype(np.float32), new.observed.astype(np.float32)

@@ -1,42 +1,80 @@
 """What the engine keeps of every body: preallocated arrays, a row ("slot") a body.
 
+All but the recurrent states is one record a slot, so that a batch of them is read, and written back, in one copy each.
 A slot's first ticket is `fresh` and clears it, so that releasing costs nothing.
 """
 
 from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fervor.emotions import EMOTIONS
 from fervor.engine.history import History
-from fervor.engine.posing import Poses
 from fervor.errors import CheckpointMismatch, Overloaded
 from fervor.metadata import ModelMetadata
 from fervor.rotations import IDENTITY
 from fervor.session.checkpoint import Memory
 from fervor.session.lanes import LANES
 from fervor.skeletons.positions import no_hinges
-from fervor.skeletons.rig import JOINTS, UPPER_BODY
+from fervor.skeletons.rig import JOINTS
+
+RECORD = np.dtype(
+    [
+        ("pose", "<f8", (len(JOINTS), 4)),  # [joint, 4] xyzw, the newest pose, holes held
+        ("hinges", "<f8", no_hinges().shape),  # [limb, bone, 3] landmark sensors: axes of limbs last bent
+        ("jumps", "<i8", (len(JOINTS),)),  # [joint] frames rejected in a row
+        ("said", "<f8", (1 + len(EMOTIONS),)),  # intensity, nan: no step yet; then under every emotion
+        ("seen", "<i8"),  # upper-body joints observed
+        ("observed", "?", (len(JOINTS),)),  # [joint]
+    ],
+    align=True,
+)
+"""A body but for its states; little-endian, as checkpoints are."""
+
+_BYTES = np.dtype(f"V{RECORD.itemsize}")
+"""Records as bytes: numpy copies those in one go, and structures field by field."""
+
+Records = npt.NDArray[np.void]  # [row] of RECORD
+
+
+def _empty() -> Records:
+    """The record of a body that has not been seen: of no dimensions."""
+    record = np.zeros((), RECORD)
+    record["pose"], record["said"][0] = IDENTITY, np.nan
+    return record
+
+
+_EMPTY = _empty()
+
+
+def _as_bytes(array: npt.NDArray[Any]) -> npt.NDArray[np.void]:
+    """Its rows [row] as bytes, a view: what numpy copies fastest."""
+    rows = np.ascontiguousarray(array).reshape(len(array), -1)
+    return rows.view(f"V{rows.itemsize * rows.shape[1]}")[:, 0]
 
 
 class Slots:
     """Arrays by slot; slots are claimed and released."""
 
     def __init__(self, capacity: int, metadata: ModelMetadata) -> None:
-        joints = len(JOINTS)
         self.capacity = capacity
-        self.pose = np.tile(IDENTITY, (capacity, joints, 1))  # [slot, joint, 4] xyzw, the newest pose, holes held
-        self.observed = np.zeros((capacity, joints), np.bool_)  # [slot, joint]
-        self.jumps = np.zeros((capacity, joints), np.int64)  # [slot, joint] frames rejected in a row
-        self.hinges = no_hinges((capacity,))  # [slot, limb, bone, 3] landmark sensors: axes of limbs last bent
+        records = np.zeros(capacity, RECORD)
+        self._records = records.view(_BYTES)  # [slot]
+        self._records[:] = _EMPTY.view(_BYTES)
+        self.pose: npt.NDArray[np.float64] = records["pose"]  # [slot, joint, 4]
+        self.observed: npt.NDArray[np.bool_] = records["observed"]  # [slot, joint]
+        self.by_emotion: npt.NDArray[np.float64] = records["said"][:, 1:]  # [slot, emotion]
         self.states = {
             state.name: np.zeros((capacity, LANES, *state.shape), np.float32) for state in metadata.states
         }  # name → [slot, lane, *shape]
+        self.lanes = {
+            name: state.reshape(-1, *state.shape[2:]) for name, state in self.states.items()
+        }  # name → [slot · LANES + lane, *shape], views
+        self._lane_bytes = {name: _as_bytes(lanes) for name, lanes in self.lanes.items()}
         self.histories: dict[int, History] = {}  # slot → its last poses, for bodies with memory `window` only
-        self.intensity = np.full(capacity, np.nan, np.float64)  # [slot], nan: no step yet
-        self.by_emotion = np.zeros((capacity, len(EMOTIONS)), np.float64)  # [slot, emotion]
-        self.seen = np.zeros(capacity, np.int64)  # [slot] upper-body joints observed
         self._free = deque(range(capacity))
 
     @property
@@ -59,30 +97,24 @@ class Slots:
         self.histories.pop(slot, None)
         self._free.append(slot)
 
-    def clear(self, slots: npt.NDArray[np.intp]) -> None:
-        """Forget what these slots [any] hold; states are zeroed by the lanes that restart."""
-        self.pose[slots], self.observed[slots], self.jumps[slots], self.hinges[slots] = IDENTITY, False, 0, 0.0
-        for slot in slots.tolist():
+    def clear(self, slots: Sequence[int]) -> None:
+        """Forget what these slots hold; states are zeroed by the lanes that restart."""
+        self._records[slots] = _EMPTY.view(_BYTES)
+        for slot in slots:
             self.histories.pop(slot, None)
-        self.intensity[slots], self.by_emotion[slots], self.seen[slots] = np.nan, 0.0, 0
 
-    def move(
-        self,
-        slots: npt.NDArray[np.intp],
-        posed: npt.NDArray[np.bool_],
-        *,
-        new: Poses,
-        jumps: npt.NDArray[np.int64],
-        hinges: npt.NDArray[np.float64] | None,
-    ) -> None:
-        """Take the newest poses of those slots [row] that have one (`posed` [row]); hinges None: no sensor has any."""
-        if not posed.all():
-            slots, new, jumps = slots[posed], new.rows(posed), jumps[posed]
-            hinges = None if hinges is None else hinges[posed]
-        self.pose[slots], self.observed[slots], self.jumps[slots] = new.rotations, new.observed, jumps
-        self.seen[slots] = np.count_nonzero(new.observed[:, UPPER_BODY], axis=1)
-        if hinges is not None:
-            self.hinges[slots] = hinges
+    def read(self, slots: npt.NDArray[np.intp]) -> Records:
+        """Copies of the records of these slots [row]."""
+        return self._records[slots].view(RECORD)
+
+    def write(self, slots: npt.NDArray[np.intp], records: Records) -> None:
+        """Make these slots [row] hold these records [row]."""
+        self._records[slots] = records.view(_BYTES)
+
+    def put(self, at: npt.NDArray[np.intp], states: Mapping[str, npt.NDArray[np.float32]]) -> None:
+        """Make lanes [row] (see `lanes`) hold these states, name → [row, *shape]."""
+        for name, lanes in self._lane_bytes.items():
+            lanes[at] = _as_bytes(states[name])
 
     def recall(self, slot: int) -> Memory:
         """Copies of all that a slot holds."""
@@ -107,15 +139,7 @@ class Slots:
         if rotations is not None and mask is not None:
             self.histories[slot] = History(rotations.astype(np.float32), mask.astype(np.float32))
 
-    def _arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """Everything kept by slot, by name."""
-        return {
-            "pose": self.pose,
-            "observed": self.observed,
-            "jumps": self.jumps,
-            "hinges": self.hinges,
-            "intensity": self.intensity,
-            "by_emotion": self.by_emotion,
-            "seen": self.seen,
-            **{f"state.{name}": state for name, state in self.states.items()},
-        }
+    def _arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Everything kept by slot, by name: records as bytes."""
+        octets = self._records.view(np.uint8).reshape(self.capacity, -1)
+        return {"body": octets, **{f"state.{name}": state for name, state in self.states.items()}}

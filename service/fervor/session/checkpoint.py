@@ -20,7 +20,7 @@ from fervor.levels import Level
 from fervor.protocol.messages import PROTOCOL, Flag
 from fervor.session.answers import Answers
 
-FORMAT = 3
+FORMAT = 4
 """Version of these bytes."""
 
 MOST_PLAIN = 8192

@@ -53,8 +53,7 @@ class Restore:
     memory: Memory
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(msgspec.Struct, frozen=True):
     """What kind of joints a session sends; poses of equal sources are adapted together."""
 
     skeleton: Skeleton | Landmarks

@@ -34,6 +34,9 @@ class LaneStep:
     """Its share of the estimate; the shares of a step add up to 1."""
 
 
+NO_LANES = 0
+"""Row of every lane plan in which no lane runs: a window's."""
+
 Schedule = tuple[LaneStep, ...]
 
 _ALONE: Schedule = (LaneStep(0, restart=False, weight=1.0),)
@@ -57,13 +60,15 @@ class LanePlan:
     runs: npt.NDArray[np.bool_]  # [row, lane]
     restart: npt.NDArray[np.bool_]  # [row, lane]
     weight: npt.NDArray[np.float64]  # [row, lane], zero where a lane does not run
+    restarting: frozenset[int]
+    """Rows in which any lane restarts."""
 
     def row(self, memory: Memory, index: int) -> int:
         """Where `schedule` of step `index` stands."""
         if memory == "staggered":  # the first period, then so many rows for every later one
             return 3 + index if index < self.period else 3 + self.period + index % self.period
         if memory == "window":
-            return 0
+            return NO_LANES
         return 1 if index == 0 else 2
 
 
@@ -78,7 +83,7 @@ def lane_plan(rate_hz: float) -> LanePlan:
     for row, lanes in enumerate(rows):
         for step in lanes:
             runs[row, step.lane], restart[row, step.lane], weight[row, step.lane] = True, step.restart, step.weight
-    return LanePlan(len(cycle), runs, restart, weight)
+    return LanePlan(len(cycle), runs, restart, weight, frozenset(np.flatnonzero(restart.any(axis=1)).tolist()))
 
 
 def window_steps(memory: Memory, rate_hz: float) -> int:
