@@ -95,9 +95,9 @@ def test_adapting_a_mixed_batch_gives_each_row_what_it_gets_alone(count):
         rotations = motion(1, seed=row, joints=joints)[0]
         body = Body(str(row), row, agreed)
         tickets.append(body.plan(0, 0.0, Pose(rotations, np.arange(joints) != row % joints)))
-    together, _ = adapt_all(tickets, no_hinges((count,)))
+    together = adapt_all(tickets, no_hinges((count,))).poses
     for row, ticket in enumerate(tickets):
-        alone, _ = adapt_all([ticket], no_hinges((1,)))
+        alone = adapt_all([ticket], no_hinges((1,))).poses
         assert np.array_equal(together.rotations[row], alone.rotations[0])
         assert np.array_equal(together.observed[row], alone.observed[0])
 

@@ -4,7 +4,7 @@ A batch either changes all of its bodies' slots or, if the model fails, none of 
 depend on what else is in its batch: the model was checked for that at start-up, all else is elementwise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import isnan
 from typing import NamedTuple
 
@@ -22,8 +22,8 @@ from fervor.session.checkpoint import Memory
 from fervor.session.events import Outcome, Step, Ticket
 from fervor.session.lanes import LANES, NO_LANES, lane_plan
 
-MOST_ROWS = 256
-"""Rows in one call of the model; larger batches are cut, for cache and latency."""
+MOST_STEPS = 128
+"""Steps in one call of the model, of up to `LANES` rows each; larger batches are cut, for cache and latency."""
 
 
 class Engine:
@@ -71,56 +71,38 @@ class Engine:
         memory = BatchMemory(self.slots, rows)
         records = memory.records
         old = Poses(records["pose"], records["observed"])
-        came, hinges = adapt_all(tickets, records["hinges"])
-        came, jumps, jumped = _believed(tickets, came, old, records["jumps"])
-        new = hold(came, old)
+        came = adapt_all(tickets, records["hinges"])
+        poses, jumps, jumped = _believed(tickets, came.poses, old, records["jumps"])
+        new = hold(poses, old)
         try:
-            for turn in range(max([len(ticket.steps) for ticket in tickets])):
-                self._turn(tickets, turn, old, new, memory)
+            for turn in _turns(tickets, old, new):
+                self._run_lanes(turn, memory)
+                if turn.windows:
+                    self._run_windows(turn, memory)
         except BaseException:
             memory.undo()
             raise
-        memory.keep(_posed(tickets), new, jumps=jumps, hinges=hinges)
+        memory.keep(came.posed, new, jumps=jumps, hinges=came.hinges)
         memory.store()
         return _outcomes(tickets, self.slots, memory, jumped)
-
-    def _turn(self, tickets: Sequence[Ticket], number: int, old: Poses, new: Poses, memory: BatchMemory) -> None:
-        """One grid step of every ticket that has a step `number`."""
-        steps = [ticket.steps[number] for ticket in tickets if len(ticket.steps) > number]
-        if len(steps) == len(tickets):
-            index = np.arange(len(tickets))
-        else:
-            index = np.array([row for row, ticket in enumerate(tickets) if len(ticket.steps) > number], np.intp)
-            old, new = old.rows(index), new.rows(index)
-        fractions, held = [step.fraction for step in steps], [step.held for step in steps]
-        if True not in held and min(fractions) >= 1.0:  # as of sensors that keep the grid's time
-            rotations, mask = arrived(new)
-        else:
-            rotations, mask = between(old, new, np.array(fractions), np.array(held))
-        labels = b"".join([step.label.vector.tobytes() for step in steps])  # sooner done than np.stack
-        emotion = np.frombuffer(labels, np.float32).reshape(len(steps), len(EMOTIONS))  # [step, emotion]
-        places = [step.lanes for step in steps]
-        taken = _Turn(index, steps, places, rotations, mask, emotion)
-        self._run_lanes(taken, memory)
-        if NO_LANES in places:
-            self._run_windows(taken, memory)
 
     def _run_lanes(self, turn: "_Turn", memory: BatchMemory) -> None:
         """The steps of bodies with recurrent states: a row of the model for every lane that runs."""
         plan, place = self._plan, np.array(turn.places, np.intp)
         runs = plan.runs.take(place, axis=0)  # [step, lane]
-        running = np.flatnonzero(runs)  # [row] step · LANES + lane
+        running = runs.ravel().nonzero()[0]  # [row] step · LANES + lane
         if not len(running):
             return
-        step, lane = running // LANES, running % LANES
+        step, lane = np.divmod(running, LANES)
         restart = None
         if not plan.restarting.isdisjoint(turn.places):
             restart = np.flatnonzero(plan.restart.take(place, axis=0).ravel().take(running))
         at = memory.place(turn.tickets.take(step), lane)
         said, states = self._call(*turn.inputs(step), memory.lanes(at, restart))
         memory.move(at, states)
-        blended = _blend(said, runs, running, plan.weight.take(place, axis=0))
-        if NO_LANES in turn.places:
+        said *= plan.weight.take(place, axis=0).ravel().take(running)[:, None]
+        blended = _summed(said, runs, running)
+        if turn.windows:
             stateful = runs.any(axis=1)
             memory.said[turn.tickets[stateful]] = blended[stateful]
         else:
@@ -152,23 +134,8 @@ class Engine:
         mask: Floats,  # [row, joint]
         emotion: Floats,  # [row, emotion]
         states: States,
-    ) -> tuple[Floats, States]:
-        """One step of the model, cut into calls: what is said [row, 1 + emotion], next states."""
-        if len(rotations) <= MOST_ROWS:
-            return self._call_once(rotations, mask, emotion, states)
-        parts = [
-            self._call_once(
-                rotations[cut], mask[cut], emotion[cut], {name: state[cut] for name, state in states.items()}
-            )
-            for cut in (slice(first, first + MOST_ROWS) for first in range(0, len(rotations), MOST_ROWS))
-        ]
-        return (
-            np.concatenate([said for said, _ in parts]),
-            {name: np.concatenate([after[name] for _, after in parts]) for name in states},
-        )
-
-    def _call_once(self, rotations: Floats, mask: Floats, emotion: Floats, states: States) -> tuple[Floats, States]:
-        """As `_call`, of no more rows than the model is given at once."""
+    ) -> tuple[npt.NDArray[np.float64], States]:
+        """One step of the model: what is said [row, 1 + emotion], next states."""
         count = len(rotations)
         spare = -count % self._row_multiple
         if not spare:
@@ -185,11 +152,13 @@ class Engine:
 
 
 class _Turn(NamedTuple):
-    """One grid step of some of a batch's tickets."""
+    """One grid step of some of a batch's tickets, at most `MOST_STEPS`."""
 
     tickets: npt.NDArray[np.intp]  # [step] whose it is, by number
     steps: Sequence[Step]
     places: Sequence[int]  # [step] row of the lane plan
+    windows: bool
+    """Whether any of them has a window in place of lanes."""
     rotations: Floats  # [step, joint, 4] xyzw
     mask: Floats  # [step, joint]
     emotion: Floats  # [step, emotion]
@@ -197,6 +166,31 @@ class _Turn(NamedTuple):
     def inputs(self, step: npt.NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
         """Rotations, mask and emotion of the rows of these steps [row]."""
         return self.rotations.take(step, axis=0), self.mask.take(step, axis=0), self.emotion.take(step, axis=0)
+
+
+def _turns(tickets: Sequence[Ticket], old: Poses, new: Poses) -> Iterator[_Turn]:
+    """The steps of a batch: the first ones of all tickets, then the second ones of those that have two, and so on."""
+    counts = [len(ticket.steps) for ticket in tickets]
+    for number in range(max(counts)):
+        rows = [row for row, count in enumerate(counts) if count > number]
+        for first in range(0, len(rows), MOST_STEPS):
+            some = rows[first : first + MOST_STEPS]
+            yield _turn([tickets[row].steps[number] for row in some], np.array(some, np.intp), old, new)
+
+
+def _turn(steps: Sequence[Step], rows: npt.NDArray[np.intp], old: Poses, new: Poses) -> _Turn:
+    """Steps of these tickets [step], given the poses of all."""
+    whole = len(rows) == len(new.rotations)
+    after = new if whole else new.rows(rows)
+    if [step for step in steps if step.held or step.fraction < 1.0]:
+        fraction, held = np.array([step.fraction for step in steps]), np.array([step.held for step in steps])
+        rotations, mask = between(old if whole else old.rows(rows), after, fraction, held)
+    else:  # as of sensors that keep the grid's time
+        rotations, mask = arrived(after)
+    labels = b"".join([step.label.vector.tobytes() for step in steps])  # sooner done than np.stack
+    emotion = np.frombuffer(labels, np.float32).reshape(len(steps), len(EMOTIONS))
+    places = [step.lanes for step in steps]
+    return _Turn(rows, steps, places, NO_LANES in places, rotations, mask, emotion)
 
 
 def _believed(
@@ -210,41 +204,33 @@ def _believed(
     return came, counts, np.count_nonzero(rejected, axis=1).tolist()
 
 
-def _posed(tickets: Sequence[Ticket]) -> npt.NDArray[np.intp] | None:
-    """The tickets with a pose; None where all have one."""
-    posed = [row for row, ticket in enumerate(tickets) if ticket.pose is not None]
-    return None if len(posed) == len(tickets) else np.array(posed, np.intp)
-
-
-def _said(outputs: Outputs, rows: slice, time: int) -> Floats:
+def _said(outputs: Outputs, rows: slice, time: int) -> npt.NDArray[np.float64]:
     """Intensity, and that under every emotion, at one time: [row, 1 + emotion].
 
     Raises:
         EngineError: an intensity that is not finite.
     """
-    intensity, by_emotion = outputs.intensity[rows, time], outputs.intensity_by_emotion[rows, time]
+    intensity, by_emotion = outputs.intensity[rows, time, None], outputs.intensity_by_emotion[rows, time]
     if not np.isfinite(intensity).all():
         raise EngineError("the model gave an intensity that is not finite; the body starts anew")
-    return np.concatenate([intensity[:, None], by_emotion], axis=1)
+    return np.concatenate((intensity, by_emotion), axis=1, dtype=np.float64)
 
 
-def _blend(
-    values: Floats,  # [row, k]
+def _summed(
+    said: npt.NDArray[np.float64],  # [row, k]
     runs: npt.NDArray[np.bool_],  # [step, lane]
     running: npt.NDArray[np.intp],  # [row] step · LANES + lane
-    weight: npt.NDArray[np.float64],  # [step, lane]
 ) -> npt.NDArray[np.float64]:
-    """Values of the lanes that run, weighted into one a step: [step, k]."""
-    if len(running) == runs.size:  # every lane of every step runs
-        spread = values
-    else:
-        spread = np.zeros((runs.size, values.shape[1]), np.float32)
-        spread[running] = values
-    spread = spread.reshape(*runs.shape, -1)
-    blended = weight[:, 0, None] * spread[:, 0]
+    """What the lanes of each step say together: [step, k]."""
+    if len(running) < runs.size:
+        spread = np.zeros((runs.size, said.shape[1]))
+        spread[running] = said
+        said = spread
+    by_lane = said.reshape(*runs.shape, -1)
+    total = by_lane[:, 0]
     for lane in range(1, LANES):
-        blended += weight[:, lane, None] * spread[:, lane]
-    return blended
+        total = total + by_lane[:, lane]
+    return total
 
 
 def _outcomes(tickets: Sequence[Ticket], slots: Slots, memory: BatchMemory, jumped: Sequence[int]) -> list[Outcome]:

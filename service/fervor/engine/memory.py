@@ -1,5 +1,7 @@
 """What a batch changes: all of it, or nothing."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,6 +15,9 @@ from fervor.skeletons.rig import UPPER_BODY
 States = dict[str, Floats]  # name → [row, *shape]
 
 Index = npt.NDArray[np.intp]
+
+
+_UPPER_BODY = np.array(UPPER_BODY)
 
 
 class BatchMemory:
@@ -42,7 +47,7 @@ class BatchMemory:
         return {at: kept[slot] for at, slot in enumerate(self._rows.tolist()) if slot in kept} if kept else {}
 
     def place(self, tickets: Index, lane: Index) -> Index:
-        """Where the states of these lanes of tickets, both [row], are kept: see `Slots.lanes`."""
+        """The numbers of these lanes of tickets, both [row]: see `Slots.take`."""
         return self._rows.take(tickets) * LANES + lane
 
     def lanes(self, at: Index, restart: Index | None = None) -> States:
@@ -52,7 +57,7 @@ class BatchMemory:
             at: [row] which, from `place`.
             restart: those of the rows that begin from zero.
         """
-        states = {name: lanes.take(at, axis=0) for name, lanes in self._slots.lanes.items()}
+        states = self._slots.take(at)
         if restart is not None:
             self._before.append((at[restart], {name: state[restart] for name, state in states.items()}))
             for state in states.values():
@@ -85,14 +90,18 @@ class BatchMemory:
             jumps: [ticket, joint] frames rejected in a row; None where no source is noisy.
             hinges: [ticket, limb, bone, 3]; None where no sensor has any.
         """
-        rows = slice(None) if posed is None else posed
-        records = self.records
-        records["pose"][rows], records["observed"][rows] = new.rotations[rows], new.observed[rows]
-        records["seen"][rows] = np.add.reduce(new.observed[rows].take(UPPER_BODY, axis=1), axis=1)
-        if jumps is not None:
-            records["jumps"][rows] = jumps[rows]
-        if hinges is not None:
-            records["hinges"][rows] = hinges[rows]
+        changed: dict[str, npt.NDArray[Any] | None] = {
+            "pose": new.rotations,
+            "observed": new.observed,
+            "seen": np.add.reduce(new.observed.take(_UPPER_BODY, axis=1), axis=1),
+            "jumps": jumps,
+            "hinges": hinges,
+        }
+        for name, values in changed.items():
+            if values is not None and posed is None:
+                self.records[name] = values
+            elif values is not None:
+                self.records[name][posed] = values[posed]
 
     def store(self) -> None:
         """Make records and histories what the slots hold."""

@@ -38,34 +38,36 @@ class Poses(NamedTuple):
         return Poses(self.rotations[which], self.observed[which])
 
 
-def adapt_all(
-    tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]
-) -> tuple[Poses, npt.NDArray[np.float64] | None]:
+class Came(NamedTuple):
+    """What a batch of tickets brings."""
+
+    poses: Poses  # identity and unobserved, where a ticket has none
+    posed: npt.NDArray[np.intp] | None  # the tickets with a pose, by number; None where all have one
+    hinges: npt.NDArray[np.float64] | None
+    """[row, limb, bone, 3] what is to be remembered of limbs; None where nobody has a landmark sensor."""
+
+
+def adapt_all(tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]) -> Came:
     """The tickets' poses in the rig C13; tickets of one source are adapted in one go.
 
     Args:
         tickets: the batch.
         hinges: [row, limb, bone, 3] what landmark sensors remember of each body's limbs.
-
-    Returns:
-        the poses, and the hinges [row, limb, bone, 3] after them; None where nobody has such a sensor.
     """
     poses = [ticket.pose for ticket in tickets if ticket.pose is not None]
     source = tickets[0].source
-    strange = [ticket for ticket in tickets if ticket.source is not source]
-    if len(poses) == len(tickets) and not strange and isinstance(source.skeleton, Skeleton):
-        return Poses(*adapt(source.skeleton, *_stacked(poses), axes=source.axes)), None
+    others = len(poses) < len(tickets) or [ticket for ticket in tickets if ticket.source is not source]
+    if not others and isinstance(source.skeleton, Skeleton):
+        return Came(Poses(*adapt(source.skeleton, *_stacked(poses), axes=source.axes)), None, None)
     return _adapt_by_source(tickets, hinges)
 
 
-def _adapt_by_source(
-    tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]
-) -> tuple[Poses, npt.NDArray[np.float64] | None]:
+def _adapt_by_source(tickets: Sequence[Ticket], hinges: npt.NDArray[np.float64]) -> Came:
     """As `adapt_all`, of any sources."""
     by_source: dict[Source, list[int]] = {}
-    for row, ticket in enumerate(tickets):
-        if ticket.pose is not None:
-            by_source.setdefault(ticket.source, []).append(row)
+    posed = [row for row, ticket in enumerate(tickets) if ticket.pose is not None]
+    for row in posed:
+        by_source.setdefault(tickets[row].source, []).append(row)
     rotations = np.tile(IDENTITY, (len(tickets), len(JOINTS), 1))
     observed = np.zeros((len(tickets), len(JOINTS)), np.bool_)
     after: npt.NDArray[np.float64] | None = None
@@ -78,7 +80,7 @@ def _adapt_by_source(
             )
         else:
             rotations[rows], observed[rows] = adapt(source.skeleton, joints, seen, axes=source.axes)
-    return Poses(rotations, observed), after
+    return Came(Poses(rotations, observed), None if len(posed) == len(tickets) else np.array(posed, np.intp), after)
 
 
 def _stacked(poses: Sequence[Pose]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:

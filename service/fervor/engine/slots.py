@@ -6,7 +6,7 @@ A slot's first ticket is `fresh` and clears it, so that releasing costs nothing.
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -50,10 +50,17 @@ def _empty() -> Records:
 _EMPTY = _empty()
 
 
-def _as_bytes(array: npt.NDArray[Any]) -> npt.NDArray[np.void]:
-    """Its rows [row] as bytes, a view: what numpy copies fastest."""
-    rows = np.ascontiguousarray(array).reshape(len(array), -1)
-    return rows.view(f"V{rows.itemsize * rows.shape[1]}")[:, 0]
+class _Lanes(NamedTuple):
+    """One state of all lanes."""
+
+    name: str
+    values: npt.NDArray[np.float32]  # [slot · LANES + lane, *shape]
+    octets: npt.NDArray[np.void]  # [slot · LANES + lane] the same as bytes, which numpy copies fastest
+
+    @classmethod
+    def of(cls, name: str, state: npt.NDArray[np.float32]) -> "_Lanes":
+        values = state.reshape(-1, *state.shape[2:])
+        return cls(name, values, values.reshape(len(values), -1).view(f"V{values[0].nbytes}")[:, 0])
 
 
 class Slots:
@@ -70,10 +77,11 @@ class Slots:
         self.states = {
             state.name: np.zeros((capacity, LANES, *state.shape), np.float32) for state in metadata.states
         }  # name → [slot, lane, *shape]
-        self.lanes = {
-            name: state.reshape(-1, *state.shape[2:]) for name, state in self.states.items()
-        }  # name → [slot · LANES + lane, *shape], views
-        self._lane_bytes = {name: _as_bytes(lanes) for name, lanes in self.lanes.items()}
+        self._lanes = [_Lanes.of(name, state) for name, state in self.states.items()]
+        self._kept: dict[str, npt.NDArray[Any]] = {
+            "body": records.view(np.uint8).reshape(capacity, -1),
+            **{f"state.{name}": state for name, state in self.states.items()},
+        }  # all of it by name, as checkpoints have it
         self.histories: dict[int, History] = {}  # slot → its last poses, for bodies with memory `window` only
         self._free = deque(range(capacity))
 
@@ -111,16 +119,20 @@ class Slots:
         """Make these slots [row] hold these records [row]."""
         self._records[slots] = records.view(_BYTES)
 
+    def take(self, at: npt.NDArray[np.intp]) -> dict[str, npt.NDArray[np.float32]]:
+        """Copies of the states of lanes [row], each by its number slot · LANES + lane: name → [row, *shape]."""
+        return {name: values.take(at, axis=0) for name, values, _ in self._lanes}
+
     def put(self, at: npt.NDArray[np.intp], states: Mapping[str, npt.NDArray[np.float32]]) -> None:
-        """Make lanes [row] (see `lanes`) hold these states, name → [row, *shape]."""
-        for name, lanes in self._lane_bytes.items():
-            lanes[at] = _as_bytes(states[name])
+        """Make lanes [row] hold these states, name → [row, *shape]; see `take`."""
+        for name, _, octets in self._lanes:
+            octets[at] = states[name].reshape(len(at), -1).view(octets.dtype)[:, 0]
 
     def recall(self, slot: int) -> Memory:
         """Copies of all that a slot holds."""
         history = self.histories.get(slot)
         window = {} if history is None else {"history": history.rotations, "history_mask": history.mask}
-        return Memory({name: array[slot].copy() for name, array in self._arrays().items()} | window)
+        return Memory({name: array[slot].copy() for name, array in self._kept.items()} | window)
 
     def restore(self, slot: int, memory: Memory) -> None:
         """Make a slot hold what `recall` gave.
@@ -130,16 +142,10 @@ class Slots:
         """
         arrays = dict(memory.arrays)
         rotations, mask = arrays.pop("history", None), arrays.pop("history_mask", None)
-        known = self._arrays()
-        shapes = {name: (array.shape[1:], array.dtype) for name, array in known.items()}
+        shapes = {name: (array.shape[1:], array.dtype) for name, array in self._kept.items()}
         if {name: (array.shape, array.dtype) for name, array in arrays.items()} != shapes:
             raise CheckpointMismatch("the checkpoint's state does not fit this model; start the body anew")
         for name, array in arrays.items():
-            known[name][slot] = array
+            self._kept[name][slot] = array
         if rotations is not None and mask is not None:
             self.histories[slot] = History(rotations.astype(np.float32), mask.astype(np.float32))
-
-    def _arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """Everything kept by slot, by name: records as bytes."""
-        octets = self._records.view(np.uint8).reshape(self.capacity, -1)
-        return {"body": octets, **{f"state.{name}": state for name, state in self.states.items()}}

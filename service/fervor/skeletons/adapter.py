@@ -31,7 +31,7 @@ class _Plan:
     """Which source joints make up each rig joint. Paths are padded with the index of the last used joint."""
 
     used: npt.NDArray[np.intp]  # [used] the source joints that matter; the last one stands for the identity
-    direct: bool  # each rig joint is one source joint as it is
+    direct: npt.NDArray[np.intp] | slice | None  # [13] the source joint that each rig joint is as it is, if all are
     up: npt.NDArray[np.intp]  # [step, 13] used joints to multiply, from below the common ancestor to P; then inverted
     down: npt.NDArray[np.intp]  # [step, 13] likewise to J
     sees: npt.NDArray[np.bool_]  # [13]
@@ -63,9 +63,11 @@ def adapt(
             f"got rotations {list(rotations.shape)} and a mask {list(observed.shape)}"
         )
     plan = _plan(skeleton, axes)
-    units, tracked, whole = _clean(rotations.take(plan.used, axis=-2), observed.take(plan.used, axis=-1))
-    if plan.direct and whole:  # nothing is to be multiplied
-        return units.take(plan.down[0], axis=-2), tracked.take(plan.down[0], axis=-1)
+    if plan.direct is not None:  # nothing is to be multiplied
+        return _clean(rotations[..., plan.direct, :], observed[..., plan.direct])
+    chosen, there = rotations.take(plan.used, axis=-2), observed.take(plan.used, axis=-1)
+    chosen[..., -1, :], there[..., -1] = IDENTITY, True
+    units, tracked = _clean(chosen, there)
     turn, seen = _along(plan.down, units, tracked)
     if len(plan.up):
         (x, y, z, w), seen_back = _along(plan.up, units, tracked)
@@ -79,24 +81,17 @@ def adapt(
     return local, seen
 
 
-def _clean(
-    rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_]
-) -> tuple[npt.NDArray[F], npt.NDArray[np.bool_], bool]:
-    """Unit rotations [..., used, 4] in place, where they were tracked [..., used], and whether all were.
-
-    The last one becomes the identity, as do the untracked.
-    """
-    rotations[..., -1, :], observed[..., -1] = IDENTITY, True
+def _clean(rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[F], npt.NDArray[np.bool_]]:
+    """Unit rotations [..., joint, 4], the identity where they were not tracked, and where they were [..., joint]."""
     with np.errstate(over="ignore", invalid="ignore"):  # numbers too large to be rotations are untracked
         size = length(rotations)
-        tracked = observed & (size >= SHORTEST) & (size < np.inf)
-    whole = bool(tracked.all())
-    if whole:
-        rotations /= size[..., None]
-    else:
-        np.divide(rotations, size[..., None], out=rotations, where=tracked[..., None])
-        rotations[~tracked] = IDENTITY
-    return rotations, tracked, whole
+        tracked = (size >= SHORTEST) & (size < np.inf)
+    tracked &= observed
+    if tracked.all():
+        return rotations / size[..., None], tracked
+    units = identity(size.shape, rotations.dtype)
+    np.divide(rotations, size[..., None], out=units, where=tracked[..., None])
+    return units, tracked
 
 
 def check_axes(skeleton: Skeleton, axes: Axes) -> None:
@@ -147,7 +142,7 @@ def _plan(skeleton: Skeleton, axes: Axes) -> _Plan:
     aligned = bool((skeleton.bind == IDENTITY).all())
     return _Plan(
         used=np.array([*used, 0], np.intp),
-        direct=aligned and not any(ups) and all(len(path) == 1 for path in downs),
+        direct=_direct(downs, len(skeleton.joints)) if aligned and not any(ups) else None,
         up=_padded(ups, used),
         down=_padded(downs, used) if any(downs) else np.full((1, len(downs)), len(used), np.intp),
         sees=np.array(skeleton.sees),
@@ -155,6 +150,14 @@ def _plan(skeleton: Skeleton, axes: Axes) -> _Plan:
         above=np.ascontiguousarray(skeleton.bind[list(PARENT_SEGMENT)].T),
         below=np.ascontiguousarray(conjugate(skeleton.bind[list(CHILD_SEGMENT)]).T),
     )
+
+
+def _direct(paths: list[list[int]], joints: int) -> npt.NDArray[np.intp] | slice | None:
+    """The joints that the paths are, where each is one of the source's; a slice for all of them in order."""
+    if any(len(path) != 1 for path in paths):
+        return None
+    ends = [path[0] for path in paths]
+    return slice(None) if ends == [*range(joints)] else np.array(ends, np.intp)
 
 
 def _path(parents: tuple[int, ...], joint: int) -> list[int]:
