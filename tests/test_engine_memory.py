@@ -26,16 +26,22 @@ def contents(slots: Slots) -> list[bytes]:
 def test_lanes_are_those_of_the_tickets_slots() -> None:
     slots = filled()
     memory = BatchMemory(slots, ROWS)
-    for name, state in memory.lanes(memory.place(TICKETS, LANE)).items():
+    for name, state in memory.take(memory.lanes(TICKETS, LANE)).items():
         assert np.array_equal(state, slots.states[name][[4, 4, 2], [0, 1, 1]])
         state[:] = 0.0  # a copy: the slots keep theirs
         assert slots.states[name][4, 0].any()
 
 
+def test_all_lanes_are_every_ticket_with_every_lane() -> None:
+    memory = BatchMemory(filled(), ROWS)
+    tickets = np.array([2, 0])
+    assert memory.all_lanes(tickets).tolist() == memory.lanes(tickets.repeat(2), np.tile([0, 1], 2)).tolist()
+
+
 def step(memory: BatchMemory, tickets: np.ndarray, lane: np.ndarray, restart: np.ndarray | None = None) -> None:
     """A step that adds one to the states of these lanes."""
-    at = memory.place(tickets, lane)
-    memory.move(at, {name: state + 1.0 for name, state in memory.lanes(at, restart).items()})
+    at = memory.lanes(tickets, lane)
+    memory.put(at, {name: state + 1.0 for name, state in memory.take(at, restart).items()})
 
 
 def test_steps_go_on_from_one_another() -> None:
@@ -55,7 +61,7 @@ def test_steps_go_on_from_one_another() -> None:
 def test_lanes_that_restart_begin_from_zero() -> None:
     slots = filled()
     memory = BatchMemory(slots, ROWS)
-    states = memory.lanes(memory.place(TICKETS, LANE), np.array([1]))
+    states = memory.take(memory.lanes(TICKETS, LANE), np.array([1]))
     assert all(not state[1].any() and state[0].any() and state[2].any() for state in states.values())
 
 

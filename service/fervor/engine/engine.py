@@ -89,21 +89,25 @@ class Engine:
     def _run_lanes(self, turn: "_Turn", memory: BatchMemory) -> None:
         """The steps of bodies with recurrent states: a row of the model for every lane that runs."""
         plan, place = self._plan, np.array(turn.places, np.intp)
-        runs = plan.runs.take(place, axis=0)  # [step, lane]
-        running = runs.ravel().nonzero()[0]  # [row] step · LANES + lane
-        if not len(running):
-            return
-        step, lane = np.divmod(running, LANES)
+        weight = plan.weight.take(place, axis=0)  # [step, lane]
+        if plan.full.issuperset(turn.places):  # as of bodies that are older than a few seconds
+            running = None
+            at, inputs = memory.all_lanes(turn.tickets), turn.inputs_of_all()
+        else:
+            running = plan.runs.take(place, axis=0).ravel().nonzero()[0]  # [row] step · LANES + lane
+            if not len(running):
+                return
+            step, lane = np.divmod(running, LANES)
+            at, inputs = memory.lanes(turn.tickets.take(step), lane), turn.inputs(step)
         restart = None
         if not plan.restarting.isdisjoint(turn.places):
-            restart = np.flatnonzero(plan.restart.take(place, axis=0).ravel().take(running))
-        at = memory.place(turn.tickets.take(step), lane)
-        said, states = self._call(*turn.inputs(step), memory.lanes(at, restart))
-        memory.move(at, states)
-        said *= plan.weight.take(place, axis=0).ravel().take(running)[:, None]
-        blended = _summed(said, runs, running)
+            restarts = plan.restart.take(place, axis=0).ravel()
+            restart = np.flatnonzero(restarts if running is None else restarts.take(running))
+        said, states = self._call(*inputs, memory.take(at, restart))
+        memory.put(at, states)
+        blended = _blend(said, weight, running)
         if turn.windows:
-            stateful = runs.any(axis=1)
+            stateful = plan.runs.take(place, axis=0).any(axis=1)
             memory.said[turn.tickets[stateful]] = blended[stateful]
         else:
             memory.said[turn.tickets] = blended
@@ -163,6 +167,10 @@ class _Turn(NamedTuple):
     mask: Floats  # [step, joint]
     emotion: Floats  # [step, emotion]
 
+    def inputs_of_all(self) -> tuple[Floats, Floats, Floats]:
+        """Rotations, mask and emotion of the rows of all steps, where every lane runs."""
+        return self.rotations.repeat(LANES, axis=0), self.mask.repeat(LANES, axis=0), self.emotion.repeat(LANES, axis=0)
+
     def inputs(self, step: npt.NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
         """Rotations, mask and emotion of the rows of these steps [row]."""
         return self.rotations.take(step, axis=0), self.mask.take(step, axis=0), self.emotion.take(step, axis=0)
@@ -216,21 +224,23 @@ def _said(outputs: Outputs, rows: slice, time: int) -> npt.NDArray[np.float64]:
     return np.concatenate((intensity, by_emotion), axis=1, dtype=np.float64)
 
 
-def _summed(
+def _blend(
     said: npt.NDArray[np.float64],  # [row, k]
-    runs: npt.NDArray[np.bool_],  # [step, lane]
-    running: npt.NDArray[np.intp],  # [row] step · LANES + lane
+    weight: npt.NDArray[np.float64],  # [step, lane]
+    running: npt.NDArray[np.intp] | None,  # [row] step · LANES + lane; None: all
 ) -> npt.NDArray[np.float64]:
-    """What the lanes of each step say together: [step, k]."""
-    if len(running) < runs.size:
-        spread = np.zeros((runs.size, said.shape[1]))
-        spread[running] = said
-        said = spread
-    by_lane = said.reshape(*runs.shape, -1)
-    total = by_lane[:, 0]
+    """What the lanes of each step say, weighted into one: [step, k]."""
+    if running is None:
+        by_lane = said
+    else:
+        by_lane = np.zeros((weight.size, said.shape[1]))
+        by_lane[running] = said
+    by_lane *= weight.reshape(-1, 1)
+    by_lane = by_lane.reshape(*weight.shape, -1)
+    blended = by_lane[:, 0]
     for lane in range(1, LANES):
-        total = total + by_lane[:, lane]
-    return total
+        blended = blended + by_lane[:, lane]
+    return blended
 
 
 def _outcomes(tickets: Sequence[Ticket], slots: Slots, memory: BatchMemory, jumped: Sequence[int]) -> list[Outcome]:

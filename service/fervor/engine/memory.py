@@ -17,6 +17,7 @@ States = dict[str, Floats]  # name → [row, *shape]
 Index = npt.NDArray[np.intp]
 
 
+_ALL_LANES = np.arange(LANES)
 _UPPER_BODY = np.array(UPPER_BODY)
 
 
@@ -46,15 +47,19 @@ class BatchMemory:
         kept = self._slots.histories
         return {at: kept[slot] for at, slot in enumerate(self._rows.tolist()) if slot in kept} if kept else {}
 
-    def place(self, tickets: Index, lane: Index) -> Index:
+    def lanes(self, tickets: Index, lane: Index) -> Index:
         """The numbers of these lanes of tickets, both [row]: see `Slots.take`."""
         return self._rows.take(tickets) * LANES + lane
 
-    def lanes(self, at: Index, restart: Index | None = None) -> States:
-        """Copies of the states of lanes, to be followed by `move`.
+    def all_lanes(self, tickets: Index) -> Index:
+        """The numbers of all lanes of these tickets, ticket by ticket."""
+        return np.add.outer(self._rows.take(tickets) * LANES, _ALL_LANES).ravel()
+
+    def take(self, at: Index, restart: Index | None = None) -> States:
+        """Copies of the states of lanes, to be followed by `put`.
 
         Args:
-            at: [row] which, from `place`.
+            at: [row] their numbers.
             restart: those of the rows that begin from zero.
         """
         states = self._slots.take(at)
@@ -65,7 +70,7 @@ class BatchMemory:
         self._before.append((at, states))
         return states
 
-    def move(self, at: Index, states: States) -> None:
+    def put(self, at: Index, states: States) -> None:
         """What a step made of these lanes [row]."""
         self._slots.put(at, states)
 

@@ -60,6 +60,8 @@ class LanePlan:
     runs: npt.NDArray[np.bool_]  # [row, lane]
     restart: npt.NDArray[np.bool_]  # [row, lane]
     weight: npt.NDArray[np.float64]  # [row, lane], zero where a lane does not run
+    full: frozenset[int]
+    """Rows in which every lane runs."""
     restarting: frozenset[int]
     """Rows in which any lane restarts."""
 
@@ -83,7 +85,8 @@ def lane_plan(rate_hz: float) -> LanePlan:
     for row, lanes in enumerate(rows):
         for step in lanes:
             runs[row, step.lane], restart[row, step.lane], weight[row, step.lane] = True, step.restart, step.weight
-    return LanePlan(len(cycle), runs, restart, weight, frozenset(np.flatnonzero(restart.any(axis=1)).tolist()))
+    full, restarting = (frozenset(np.flatnonzero(which).tolist()) for which in (runs.all(axis=1), restart.any(axis=1)))
+    return LanePlan(len(cycle), runs, restart, weight, full, restarting)
 
 
 def window_steps(memory: Memory, rate_hz: float) -> int:
