@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from bodies import model, motion, terms
 from fervor.emotions import emotion_vector
-from fervor.engine.engine import Engine
+from fervor.engine.engine import MOST_STEPS, Engine
 from fervor.errors import EngineError
 from fervor.model import Model
 from fervor.session.body import Body
@@ -111,6 +111,41 @@ def test_alone_or_beside_three_hundred_others_changes_no_bit():
         assert np.array_equal(got.by_emotion, expected[seq].by_emotion)
 
 
+def test_bodies_of_any_age_in_one_batch_change_no_bit():
+    """One lane runs, then two, now and then one restarts, and some take no step or several."""
+    rates, starts = (30, 30, 30, 24, 45, 30), (0, 40, 110, 0, 10, 0)
+    expected = []
+    for number, rate in enumerate(rates):
+        engine = Engine(model(), capacity=1)
+        memory = "stateful" if number == 5 else "staggered"
+        body = Body(str(number), engine.claim(), terms(memory=memory))
+        expected.append(run_alone(engine, plan(body, motion(260, seed=number), rate=rate)))
+    engine = Engine(model(), capacity=6)
+    bodies = [
+        Body(str(number), engine.claim(), terms(memory="stateful" if number == 5 else "staggered"))
+        for number in range(6)
+    ]
+    work = [plan(body, motion(260, seed=at), rate=rates[at]) for at, body in enumerate(bodies)]
+    got: list[list[Outcome]] = [[] for _ in bodies]
+    for turn in range(370):
+        batch = [(at, tickets[turn - starts[at]]) for at, tickets in enumerate(work) if 0 <= turn - starts[at] < 260]
+        for (at, _), outcome in zip(batch, engine.run([ticket for _, ticket in batch]) if batch else (), strict=True):
+            got[at].append(outcome)
+    for mine, theirs in zip(got, expected, strict=True):
+        assert intensities(mine) == intensities(theirs)
+        assert all(np.array_equal(a.by_emotion, b.by_emotion) for a, b in zip(mine, theirs, strict=True))
+
+
+def test_a_crowd_beyond_one_call_of_the_model_changes_no_bit():
+    rotations, crowd = motion(3), 2 * MOST_STEPS + 5
+    alone, engine = Engine(model(), capacity=1), Engine(model(), capacity=crowd)
+    expected = intensities(run_alone(alone, plan(Body("a", alone.claim(), terms()), rotations, rate=30)))
+    work = [plan(Body(str(number), engine.claim(), terms()), rotations, rate=30) for number in range(crowd)]
+    for seq in range(3):
+        outcomes = engine.run([tickets[seq] for tickets in work])
+        assert intensities(outcomes) == [expected[seq]] * crowd
+
+
 def test_padding_to_a_row_multiple_changes_nothing_but_the_calls():
     rotations = motion(30)
     plain, padded = Engine(model(), capacity=1), Engine(model(), capacity=1, row_multiple=8)
@@ -157,6 +192,34 @@ def test_a_failing_row_fails_alone_and_changes_nothing():
     assert isinstance(outcomes[1], EngineError)
     assert all(isinstance(outcomes[at], Outcome) for at in (0, 2))
     assert all(np.array_equal(engine.slots.states[name][1], state) for name, state in before.items())
+
+
+def test_a_run_that_fails_at_a_second_step_undoes_the_first():
+    class FailingOnce(Failing):
+        calls = 0
+
+        def run(self, *arguments):
+            self.calls += 1
+            if self.calls == self.fails_at:
+                raise EngineError("once")
+            return model().run(*arguments)
+
+        fails_at = 0
+
+    def outcomes(fails_at):
+        runtime = FailingOnce()
+        engine = Engine(runtime, capacity=3)  # type: ignore[arg-type]
+        bodies = [Body(str(number), engine.claim(), terms()) for number in range(3)]
+        rotations = motion(4)
+        for seq in range(3):
+            engine.run([body.plan(seq, seq / 30, Pose(rotations[seq], ALL)) for body in bodies])
+        runtime.fails_at = runtime.calls + fails_at
+        last = [3 / 30, 5 / 30, 4 / 30]  # one step, three, two
+        tickets = [body.plan(3, time, Pose(rotations[3], ALL)) for body, time in zip(bodies, last, strict=True)]
+        assert [len(ticket.steps) for ticket in tickets] == [1, 3, 2]
+        return intensities(engine.run(tickets))
+
+    assert outcomes(2) == outcomes(3) == outcomes(0)
 
 
 def test_a_model_that_gives_nan_is_told(monkeypatch):

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from bodies import motion, terms
-from fervor.engine.posing import JUMPS_BELIEVED, Poses, adapt_all, between, hold, reject_jumps
-from fervor.rotations import slerp
+from fervor.engine.posing import JUMP_RAD, JUMPS_BELIEVED, Poses, adapt_all, between, hold, reject_jumps
+from fervor.rotations import angle_between, multiply, slerp
 from fervor.session.body import Body
 from fervor.session.events import Pose
 from fervor.skeletons.positions import no_hinges
@@ -70,6 +70,23 @@ def test_a_flip_is_rejected_until_it_has_settled():
         assert rejected[0, 5] == (not believed)
         assert new.observed[0, 5] == believed
     assert jumps[0, 5] == 0
+
+
+def test_what_is_surely_near_needs_no_angle():
+    """Turns on both sides of the bound, and of where the angle is left out: what is rejected is what turned too far."""
+    degrees = np.concatenate([np.linspace(0, 180, 61), 120 + np.array([-0.2, -1e-3, -1e-6, 0, 1e-6, 1e-3, 0.2])])
+    old = Poses(motion(len(degrees), seed=4), np.ones((len(degrees), 13), np.bool_))
+    turn = Rotation.from_rotvec(np.radians(degrees)[:, None] * np.array([0.0, 0.6, 0.8])).as_quat()
+    new = Poses(multiply(old.rotations, turn[:, None]), old.observed)
+    far = angle_between(old.rotations, new.rotations) > JUMP_RAD
+    assert far.any(axis=1).sum() > 20
+    for rows in (slice(None), *(slice(row, row + 1) for row in range(len(degrees)))):
+        some = tuple(Poses(each.rotations[rows], each.observed[rows]) for each in (new, old))
+        noisy = np.ones(len(some[0].rotations), np.bool_)
+        came, jumps, rejected = reject_jumps(*some, np.zeros(some[0].observed.shape, np.int64), noisy)
+        assert np.array_equal(rejected, far[rows])
+        assert np.array_equal(came.observed, ~far[rows])
+        assert np.array_equal(jumps, far[rows])
 
 
 def test_a_precise_sensor_may_turn_as_far_as_it_likes():

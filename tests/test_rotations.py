@@ -191,6 +191,41 @@ def test_slerp_takes_a_fraction_per_row() -> None:
     assert np.array_equal(rot.slerp(a, b, fractions), rows)
 
 
+@given(st.lists(st.tuples(quaternions, quaternions, st.sampled_from([0.0, 0.25, 0.7, 1.0])), min_size=2, max_size=8))
+@settings(max_examples=200, deadline=None)
+def test_slerp_and_its_angle_are_the_same_in_any_company(pairs: list[tuple[Array, Array, float]]) -> None:
+    """What is left out where nobody needs it: turned away, equal, at an end of the way."""
+    a, b, fraction = (np.array(each) for each in zip(*pairs, strict=True))
+    b[0] = a[0]  # of no angle
+    way, angle = rot.slerp(a, b, fraction), rot.angle_between(a, b)
+    for row in range(len(pairs)):
+        one = slice(row, row + 1)
+        assert rot.slerp(a[one], b[one], fraction[one]).tobytes() == way[one].tobytes()
+        assert rot.angle_between(a[one], b[one]).tobytes() == angle[one].tobytes()
+
+
+@given(st.lists(st.one_of(quaternions, st.just(np.zeros(4))), min_size=2, max_size=8))
+@settings(max_examples=200, deadline=None)
+def test_unit_length_is_the_same_beside_a_zero(q: list[Array]) -> None:
+    rows = np.array([*q, np.zeros(4)]) * 1.7
+    together = rot.normalise(rows)
+    assert all(rot.normalise(row[None]).tobytes() == unit.tobytes() for row, unit in zip(rows, together, strict=True))
+
+
+signed = st.sampled_from([0.0, -0.0, 1.0, -1.0, HALF, -HALF]) | numbers
+
+
+@many
+@given(arrays(np.float64, (4, 3, 5), elements=signed), arrays(np.float64, (4, 3, 5), elements=signed))
+def test_few_products_are_those_of_many_to_the_bit(a: Array, b: Array) -> None:
+    expected = np.stack(rot.product(a, b))
+    assert rot.small_product(a, b).tobytes() == expected.tobytes()
+    assert rot.small_product(tuple(a), tuple(b)).tobytes() == expected.tobytes()
+    bind = b[:, :1]  # [4, 1, 5], for all
+    assert rot.small_product(a, bind).tobytes() == np.stack(rot.product(a, bind)).tobytes()
+    assert rot.small_product(bind, a).tobytes() == np.stack(rot.product(bind, a)).tobytes()
+
+
 @many
 @given(quaternions, quaternions)
 def test_hemisphere(q: Array, reference: Array) -> None:

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from fervor.session.lanes import FADE_S, LANES, PERIOD_S, lane_plan, lane_runs, lane_weights, schedule
+from fervor.session.lanes import FADE_S, LANES, NO_LANES, PERIOD_S, lane_plan, lane_runs, lane_weights, schedule
 
 RATE = 30.0
 
@@ -63,6 +63,9 @@ def test_the_plan_says_of_every_step_what_its_schedule_says(memory, rate):
             step = lanes.get(lane)
             planned = (plan.runs[row, lane], plan.restart[row, lane], plan.weight[row, lane])
             assert planned == ((False, False, 0.0) if step is None else (True, step.restart, step.weight))
+        assert (row in plan.full) == (len(lanes) == LANES)
+        assert (row in plan.restarting) == any(step.restart for step in lanes.values())
+        assert (row == NO_LANES) == (not lanes)
 
 
 @pytest.mark.parametrize("memory", ["staggered", "stateful"])

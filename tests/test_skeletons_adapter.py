@@ -1,6 +1,7 @@
 """The adapter against an independent implementation of formula 3 with scipy, on the catalogue and on random trees."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from fervor.errors import InputError
 from fervor.recordings.bvh import read_bvh
 from fervor.recordings.recording import rig_poses
 from fervor.rotations import IDENTITY, multiply
-from fervor.skeletons.adapter import adapt
+from fervor.skeletons.adapter import SMALL, adapt
 from fervor.skeletons.binds import T_POSE
 from fervor.skeletons.catalog import SKELETONS, skeleton
 from fervor.skeletons.rig import CHILD_SEGMENT, JOINTS, PARENT_SEGMENT, SEGMENTS, mirror_pose
@@ -250,6 +251,46 @@ def test_a_mirrored_pose_is_the_other_side() -> None:
     again, mask_again = mirror_pose(swapped, mask)
     assert np.array_equal(again, local)
     assert np.array_equal(mask_again, observed)
+
+
+@pytest.mark.parametrize("name", SKELETONS)
+@pytest.mark.parametrize("seen", [1.0, 0.9])
+def test_a_crowd_gets_what_each_gets_alone_to_the_bit(name: str, seen: float) -> None:
+    """However they are multiplied, and whether all joints are tracked or some are not."""
+    source, crowd, random = skeleton(name), 40, np.random.default_rng(3)
+    assert crowd * len(JOINTS) > SMALL > len(JOINTS)
+    rotations = random_rotations(crowd, len(source.joints), seed=4) * 1.1
+    observed = random.random(rotations.shape[:2]) < seen
+    rotations[::3, 1] *= np.where(random.random((len(rotations[::3]), 1)) < seen, 1.0, 0.0)
+    rotations[1, 0] = np.inf if seen < 1.0 else rotations[1, 0]
+    local, whole = adapt(source, rotations, observed, axes=source.axes)
+    for row in range(crowd):
+        one = slice(row, row + 1)
+        alone, visible = adapt(source, rotations[one], observed[one], axes=source.axes)
+        assert alone.tobytes() == local[one].tobytes()
+        assert visible.tobytes() == whole[one].tobytes()
+
+
+def test_joints_given_in_another_order_are_divided_like_all_others() -> None:
+    """C13 needs no product, in whatever order its joints come; a bind on top makes it take the long way."""
+    rig = skeleton("c13")
+    order = [*range(len(JOINTS))][::-1]
+    place = {old: new for new, old in enumerate(order)}
+    turned = replace(
+        rig,
+        joints=tuple(rig.joints[joint] for joint in order),
+        parents=tuple(ROOT if rig.parents[joint] == ROOT else place[rig.parents[joint]] for joint in order),
+        drives=tuple(drive if drive in (None, ROOT) else place[drive] for drive in rig.drives),
+    )
+    rotations = random_rotations(7, len(JOINTS), seed=5) * 0.9
+    observed = np.random.default_rng(6).random(rotations.shape[:2]) < 0.8
+    local, seen = adapt(rig, rotations, observed, axes="local")
+    again, seen_again = adapt(turned, rotations[:, order], observed[:, order], axes="local")
+    assert local.tobytes() == again.tobytes()
+    assert seen.tobytes() == seen_again.tobytes()
+    expected = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
+    assert np.allclose(local, np.where(observed[..., None], expected, IDENTITY), rtol=0, atol=1e-15)
+    assert np.array_equal(seen, observed)
 
 
 @needs_data

@@ -91,6 +91,23 @@ def product(a: Iterable[Any], b: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
     )
 
 
+_PLACES = np.array([[3, 2, 1, 0], [2, 3, 0, 1], [1, 0, 3, 2], [0, 1, 2, 3]])
+"""Which component of b meets each of a (row) in each of a·b (column)."""
+_SIGNS = np.array([[1.0, -1.0, 1.0, -1.0], [1.0, 1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, -1.0], [1.0, 1.0, 1.0, 1.0]])
+
+
+def small_product(a: Iterable[Any], b: Iterable[Any]) -> npt.NDArray[Any]:
+    """`product` [4, ...] to the bit, in a quarter of its calls: twice as fast for a few rotations, slower for many."""
+    left, right = np.asarray(a), np.asarray(b)
+    terms = right.take(_PLACES, axis=0)  # [of a, of a·b, ...]
+    terms *= _SIGNS.reshape(4, 4, *(1,) * (right.ndim - 1))
+    terms = left[:, None] * terms
+    total: npt.NDArray[Any] = terms[3] + terms[0]
+    total += terms[1]
+    total += terms[2]
+    return total
+
+
 def cross(a: npt.NDArray[F], b: npt.NDArray[F]) -> npt.NDArray[F]:
     """Cross products of vectors [..., 3], leading axes broadcast."""
     ax, ay, az = _parts(a)

@@ -209,7 +209,7 @@ def _believed(
     if True not in noisy:
         return came, None, [0] * len(tickets)
     came, counts, rejected = reject_jumps(came, old, jumps, np.array(noisy))
-    return came, counts, np.count_nonzero(rejected, axis=1).tolist()
+    return came, counts, np.count_nonzero(rejected, axis=1).tolist() if rejected.any() else [0] * len(tickets)
 
 
 def _said(outputs: Outputs, rows: slice, time: int) -> npt.NDArray[np.float64]:

@@ -7,7 +7,7 @@ the sensor's place, never enter. A joint counts as untracked where the source sa
 unobserved and the identity. All arithmetic is elementwise: see `fervor.rotations`.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeVar
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fervor.errors import InputError
-from fervor.rotations import IDENTITY, conjugate, identity, length, product
+from fervor.rotations import IDENTITY, conjugate, identity, length, product, small_product
 from fervor.skeletons.rig import CHILD_SEGMENT, PARENT_SEGMENT
 from fervor.skeletons.skeleton import ROOT, Axes, Skeleton
 
@@ -24,6 +24,9 @@ F = TypeVar("F", bound=np.floating[Any])
 
 SHORTEST = 0.5
 """Least length of a quaternion that counts as one (formula 5)."""
+
+SMALL = 200
+"""Rotations up to which `small_product` is the faster one, as measured."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,11 +72,14 @@ def adapt(
     chosen[..., -1, :], there[..., -1] = IDENTITY, True
     units, tracked = _clean(chosen, there)
     turn, seen = _along(plan.down, units, tracked)
+    times = _times(seen)
     if len(plan.up):
         (x, y, z, w), seen_back = _along(plan.up, units, tracked)
-        turn, seen = product((-x, -y, -z, w), turn), seen & seen_back
+        turn, seen = times((-x, -y, -z, w), turn), seen & seen_back
     if not plan.aligned:
-        turn = product(product(plan.above.astype(units.dtype), turn), plan.below.astype(units.dtype))
+        binds = (4, *(1,) * (seen.ndim - 1), -1)
+        above, below = (bind.astype(units.dtype).reshape(binds) for bind in (plan.above, plan.below))
+        turn = times(times(above, turn), below)
     seen = seen & plan.sees
     local = identity(seen.shape, units.dtype)
     for index, part in enumerate(turn):
@@ -88,7 +94,7 @@ def _clean(rotations: npt.NDArray[F], observed: npt.NDArray[np.bool_]) -> tuple[
         tracked = (size >= SHORTEST) & (size < np.inf)
     tracked &= observed
     if tracked.all():
-        return rotations / size[..., None], tracked
+        return np.divide(rotations, size[..., None], order="C"), tracked
     units = identity(size.shape, rotations.dtype)
     np.divide(rotations, size[..., None], out=units, where=tracked[..., None])
     return units, tracked
@@ -110,9 +116,15 @@ def _along(
     """Products of rotations along paths [step, 13], as components, and whether all of a path was tracked."""
     turn: Iterable[Any] = _components(units, path[0])
     seen = tracked.take(path[0], axis=-1)
+    times = _times(seen)
     for step in path[1:]:
-        turn, seen = product(turn, _components(units, step)), seen & tracked.take(step, axis=-1)
+        turn, seen = times(turn, _components(units, step)), seen & tracked.take(step, axis=-1)
     return turn, seen
+
+
+def _times(seen: npt.NDArray[np.bool_]) -> Callable[[Iterable[Any], Iterable[Any]], Iterable[Any]]:
+    """How to multiply as many rotations [4, ...] as were seen or not [...]; to the bit the same."""
+    return small_product if seen.size <= SMALL else product
 
 
 def _components(units: npt.NDArray[F], joints: npt.NDArray[np.intp]) -> npt.NDArray[F]:
