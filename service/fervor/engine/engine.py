@@ -179,11 +179,17 @@ class _Turn(NamedTuple):
 def _turns(tickets: Sequence[Ticket], old: Poses, new: Poses) -> Iterator[_Turn]:
     """The steps of a batch: the first ones of all tickets, then the second ones of those that have two, and so on."""
     counts = [len(ticket.steps) for ticket in tickets]
+    fewest = min(counts)
     for number in range(max(counts)):
-        rows = [row for row, count in enumerate(counts) if count > number]
-        for first in range(0, len(rows), MOST_STEPS):
-            some = rows[first : first + MOST_STEPS]
-            yield _turn([tickets[row].steps[number] for row in some], np.array(some, np.intp), old, new)
+        if number < fewest:
+            rows = np.arange(len(tickets))
+            steps = [ticket.steps[number] for ticket in tickets]
+        else:
+            rows = np.array([row for row, count in enumerate(counts) if count > number], np.intp)
+            steps = [ticket.steps[number] for ticket in tickets if len(ticket.steps) > number]
+        for first in range(0, len(steps), MOST_STEPS):
+            cut = slice(first, first + MOST_STEPS)
+            yield _turn(steps[cut], rows[cut], old, new)
 
 
 def _turn(steps: Sequence[Step], rows: npt.NDArray[np.intp], old: Poses, new: Poses) -> _Turn:

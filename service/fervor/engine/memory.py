@@ -53,7 +53,8 @@ class BatchMemory:
 
     def all_lanes(self, tickets: Index) -> Index:
         """The numbers of all lanes of these tickets, ticket by ticket."""
-        return np.add.outer(self._rows.take(tickets) * LANES, _ALL_LANES).ravel()
+        at: Index = ((self._rows.take(tickets) * LANES)[:, None] + _ALL_LANES).reshape(-1)
+        return at
 
     def take(self, at: Index, restart: Index | None = None) -> States:
         """Copies of the states of lanes, to be followed by `put`.
