@@ -12,8 +12,8 @@ from fervor.engine.batcher import Batcher, Run
 from fervor.engine.engine import Engine
 from fervor.errors import EngineError, FervorError
 from fervor.protocol.codec import MsgpackCodec
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.protocol.messages import Estimate
-from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.server.turn import Turn
 from fervor.session.events import Outcome, Reply, Ticket
 from fervor.session.poses import Read
@@ -37,10 +37,10 @@ class Talk:
     def agreement(self) -> Agreement | None:
         return self.session.agreement
 
-    def decode_raw(self, message: str | bytes) -> RawFrame | RawFrames | None:
-        return CODEC.decode_raw(message)
+    def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
+        return CODEC.decode_frames(message)
 
-    def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
+    def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         self.in_blocks += len(poses)
         try:
             events = self.session.receive(raw or CODEC.decode_client(message), poses)
@@ -48,7 +48,7 @@ class Talk:
             events = self.session.refuse(error)
         self.carry(events)
 
-    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+    def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         tickets = self.session.prompt(message, poses)
         self.in_blocks += len(tickets)
         self.prompted += len(tickets)

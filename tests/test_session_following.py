@@ -11,7 +11,7 @@ from bodies import as_read, host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import EngineError
 from fervor.protocol.codec import MsgpackCodec
-from fervor.protocol.raw_frame import RawFrame
+from fervor.protocol.lean_frame import LeanFrame
 from fervor.session.events import Close, Release, Reply, Ticket
 from fervor.session.following import MOST_PROMPT
 from fervor.session.poses import read_poses
@@ -76,11 +76,11 @@ class Service:
     def hear(self, message) -> None:
         self.spread.begin()
         data = msgpack.packb(message)
-        lean, agreement = CODEC.decode_raw(data), self.session.agreement
+        lean, agreement = CODEC.decode_frames(data), self.session.agreement
         if lean is None or agreement is None:
             self.carry(self.session.receive(CODEC.decode_client(data)))
             return
-        frames = (lean,) if isinstance(lean, RawFrame) else lean.frames
+        frames = (lean,) if isinstance(lean, LeanFrame) else lean.frames
         poses = read_poses([(agreement, frame) for frame in frames])
         tickets = self.session.prompt(lean, poses) if self.promptly else ()
         if tickets:

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from bodies import model, motion
 from fervor.errors import FrameError
+from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import SessionStart
-from fervor.protocol.raw_frame import RawFrame
 from fervor.session.events import Pose
 from fervor.session.poses import read_poses
 from fervor.session.start import Agreement, agree
@@ -22,7 +22,7 @@ STARTS = [
 ]
 
 
-def plainly(agreement: Agreement, frame: RawFrame) -> Pose | FrameError:
+def plainly(agreement: Agreement, frame: LeanFrame) -> Pose | FrameError:
     try:
         return agreement.pose_of(frame.to_frame())
     except FrameError as error:
@@ -35,7 +35,7 @@ def told(read: Pose | FrameError) -> object:
     return read.joints.tobytes(), read.joints.shape, read.observed.tolist(), read.lost
 
 
-def frame(agreement: Agreement, seq: int, spoil: str) -> RawFrame:
+def frame(agreement: Agreement, seq: int, spoil: str) -> LeanFrame:
     joints = motion(1, seed=seq, joints=len(agreement.joints))[0].astype(np.float32)
     match spoil:
         case "nan":
@@ -52,7 +52,7 @@ def frame(agreement: Agreement, seq: int, spoil: str) -> RawFrame:
             joints[:] = 0.0
         case "fewer":
             joints = joints[1:]
-    return RawFrame(seq=seq, q=joints.astype("<f4").tobytes(), t=0.0)
+    return LeanFrame(seq=seq, q=joints.astype("<f4").tobytes(), t=0.0)
 
 
 spoils = st.sampled_from(["", "", "nan", "long", "huge", "untracked", "short", "lost", "fewer"])

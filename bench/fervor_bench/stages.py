@@ -21,7 +21,7 @@ SAMPLES_PER_SECOND = 250
 RULES: tuple[tuple[str, str], ...] = (
     (
         "parse and validate",
-        r"decode_(client|raw)|_from_raw|_joints_of|fervor/protocol/(frame_decoder|poses|raw_frame)|fervor/session/poses|fervor/server/pace",
+        r"decode_(client|frames)|_from_raw|_joints_of|fervor/protocol/(frame_decoder|poses|lean_frame)|fervor/session/poses|fervor/server/pace",
     ),
     ("encode", r"\bencode\b.*fervor/protocol|fervor/server/encod"),
     ("checkpoint", r"checkpoint|sealing"),

@@ -13,8 +13,8 @@ from pydantic import TypeAdapter, ValidationError
 from fervor.errors import FrameError, MessageError
 from fervor.protocol.frame_decoder import frames_from_json, frames_from_msgpack
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames, lean_frames
 from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
-from fervor.protocol.raw_frame import RawFrame, RawFrames, raw_frames
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 _SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
@@ -38,7 +38,7 @@ class Codec(Protocol):
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError."""
 
-    def decode_raw(self, data: str | bytes) -> RawFrame | RawFrames | None:
+    def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
         """Frames with raw joints, for who takes many at once; None where it is any other message."""
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
@@ -58,7 +58,7 @@ class JsonCodec:
         frames = frames_from_json(data) if isinstance(data, str) else None
         return frames or self._decode(_CLIENT, data)
 
-    def decode_raw(self, data: str | bytes) -> RawFrame | RawFrames | None:  # noqa: ARG002  # see `Codec`
+    def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:  # noqa: ARG002  # see `Codec`
         """None: JSON has no raw joints."""
         return None
 
@@ -92,9 +92,9 @@ class MsgpackCodec:
         frames = frames_from_msgpack(data) if isinstance(data, bytes) else None
         return frames or self._decode(_CLIENT, data)
 
-    def decode_raw(self, data: str | bytes) -> RawFrame | RawFrames | None:
+    def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
         """Frames with raw joints, for who takes many at once; None where it is any other message."""
-        return raw_frames(data) if isinstance(data, bytes) else None
+        return lean_frames(data) if isinstance(data, bytes) else None
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""

@@ -12,6 +12,7 @@ from typing import assert_never
 from fervor.errors import EngineError, FervorError, MessageError, Overloaded
 from fervor.protocol.codec import Codec
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.protocol.messages import (
     Checkpoint,
     ClientMessage,
@@ -21,7 +22,6 @@ from fervor.protocol.messages import (
     SessionStart,
     SessionStarted,
 )
-from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.server.life import REASONS, Life
 from fervor.server.pace import Pace
 from fervor.server.service import Service
@@ -86,11 +86,11 @@ class Conversation(Life):
         """See `Taker`."""
         return self._session.agreement
 
-    def decode_raw(self, message: str | bytes) -> RawFrame | RawFrames | None:
+    def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
         """See `Taker`."""
-        return self._codec.decode_raw(message)
+        return self._codec.decode_frames(message)
 
-    def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
+    def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         """See `Taker`."""
         self._in_turn -= 1
         if self._room is not None:
@@ -98,7 +98,7 @@ class Conversation(Life):
         if self._session.state is not SessionState.CLOSED:
             self._act_on(message, raw, poses)
 
-    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+    def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """See `Taker`."""
         if self._leaving or not self._pace.has_room(len(poses)):
             return ()
@@ -122,7 +122,7 @@ class Conversation(Life):
         except Exception as fault:  # noqa: BLE001  # as below
             self._give_up(fault)
 
-    def _act_on(self, data: str | bytes, raw: RawFrame | RawFrames | None = None, poses: Sequence[Read] = ()) -> None:
+    def _act_on(self, data: str | bytes, raw: LeanFrame | LeanFrames | None = None, poses: Sequence[Read] = ()) -> None:
         if self._leaving:
             return  # what comes now is after the last checkpoint: the client sends it again where it resumes
         try:
@@ -130,12 +130,12 @@ class Conversation(Life):
         except Exception as fault:  # noqa: BLE001  # a fault of ours ends this session with a word, and no other
             self._give_up(fault)
 
-    def _understand(self, data: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> list[Event]:
+    def _understand(self, data: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> list[Event]:
         """What a message brings. Whatever it is, it counts as a frame of the pace, at least."""
         try:
             self._pace.take(1, self._heard)
             message = raw or self._decode(data)
-            if isinstance(message, RawFrames | Frames):
+            if isinstance(message, LeanFrames | Frames):
                 more = min(len(message.frames), self._settings.max_frames_per_message) - 1
                 self._pace.take(more, self._heard)
         except FervorError as error:

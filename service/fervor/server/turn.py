@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 from fervor.engine.batcher import Batcher
 from fervor.errors import EngineError
-from fervor.protocol.raw_frame import RawFrame, RawFrames
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.session.events import Outcome, Ticket
 from fervor.session.poses import Read, read_poses
 from fervor.session.start import Agreement
@@ -27,13 +27,13 @@ class Taker(Protocol):
     def agreement(self) -> Agreement | None:
         """What its session agreed on; None before the start."""
 
-    def decode_raw(self, message: str | bytes) -> RawFrame | RawFrames | None:
+    def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
         """The message as raw frames; None where it is anything else."""
 
-    def take(self, message: str | bytes, raw: RawFrame | RawFrames | None, poses: Sequence[Read]) -> None:
+    def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         """Do what the message asks; of raw frames, the poses were read already. Never raises."""
 
-    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+    def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """The tickets of frames about which nothing is unusual; none, having done nothing: `take` is to see them."""
 
     def answer(self, tickets: Sequence[Ticket], outcomes: Sequence[Outcome | EngineError]) -> None:
@@ -89,7 +89,7 @@ class Turn:
 class _Ready(NamedTuple):
     taker: Taker
     message: str | bytes
-    raw: RawFrame | RawFrames | None
+    raw: LeanFrame | LeanFrames | None
     poses: Sequence[Read]
 
 
@@ -98,7 +98,7 @@ def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
 
     Frames behind a `session.start` in the same turn have no agreement yet; their session reads them.
     """
-    decoded = [(taker, message, taker.decode_raw(message), taker.agreement) for taker, message in came]
+    decoded = [(taker, message, taker.decode_frames(message), taker.agreement) for taker, message in came]
     frames = [
         (agreement, frame)
         for _, _, raw, agreement in decoded
@@ -112,5 +112,5 @@ def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
     ]
 
 
-def _frames_of(raw: RawFrame | RawFrames) -> tuple[RawFrame, ...]:
-    return (raw,) if isinstance(raw, RawFrame) else raw.frames
+def _frames_of(raw: LeanFrame | LeanFrames) -> tuple[LeanFrame, ...]:
+    return (raw,) if isinstance(raw, LeanFrame) else raw.frames

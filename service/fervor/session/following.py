@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from fervor.emotions import emotion_vector
 from fervor.errors import EngineError, FervorError, FrameError, InputError
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.protocol.messages import (
     Checkpoint,
     Error,
@@ -19,7 +20,6 @@ from fervor.protocol.messages import (
     SessionCalibrate,
     SessionCalibrated,
 )
-from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.session.body import Body
 from fervor.session.calibrator import Calibrator
 from fervor.session.checkpoint import Bond, pack
@@ -33,7 +33,7 @@ from fervor.session.roster import Roster
 from fervor.session.start import Agreement
 from fervor.session.under_way import UnderWay
 
-AnyFrame = Frame | RawFrame
+AnyFrame = Frame | LeanFrame
 
 MOST_PROMPT = 8
 """Frames of a message that are taken promptly; the steps of more, one after the other, would hold up everybody."""
@@ -155,14 +155,14 @@ class Following:
 
     # --- frames that find nothing under way ---------------------------------------------------------------------------
 
-    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+    def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """The tickets of frames about which nothing is unusual; none, having done nothing, where something is.
 
         For a caller that runs them, and hands their outcomes to `answer`, before anything else of this session.
         """
         if self._under_way or self._calibrator.active or self._roster.has_spare:
             return ()
-        if isinstance(message, RawFrame):
+        if isinstance(message, LeanFrame):
             body = self._usual(message, poses[0])
             return () if body is None else (self._plan_usual(message, poses[0], body, None),)
         if len(message.frames) > min(MOST_PROMPT, self._host.limits.max_frames_per_message):
@@ -178,7 +178,7 @@ class Following:
         together = zip(message.frames, poses, bodies, strict=True)
         return [self._plan_usual(frame, pose, body, 0) for frame, pose, body in together]
 
-    def _usual(self, frame: RawFrame, read: Read) -> Body | None:
+    def _usual(self, frame: LeanFrame, read: Read) -> Body | None:
         """The body of a frame, where both are as they mostly are."""
         if frame.t is None or isinstance(read, FrameError):
             return None
@@ -187,7 +187,7 @@ class Following:
         body = self._roster.find(frame.body, frame.t)
         return None if body is None or frame.seq <= body.newest_seq else body
 
-    def _plan_usual(self, frame: RawFrame, pose: Read, body: Body, group: int | None) -> Ticket:
+    def _plan_usual(self, frame: LeanFrame, pose: Read, body: Body, group: int | None) -> Ticket:
         spread = self._host.spread
         if spread is not None:
             spread.note()
@@ -379,7 +379,7 @@ def _is_known(emotion: str | Mapping[str, float]) -> bool:
 
 
 def _plain(frame: AnyFrame) -> Frame:
-    return frame.to_frame() if isinstance(frame, RawFrame) else frame
+    return frame.to_frame() if isinstance(frame, LeanFrame) else frame
 
 
 def _replies(gone: tuple[str, InputError | None]) -> list[Event]:

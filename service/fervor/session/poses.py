@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fervor.errors import FrameError
+from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import Frame
 from fervor.protocol.poses import NOT_UNIT_ABOVE, UNTRACKED_BELOW
-from fervor.protocol.raw_frame import RawFrame
 from fervor.session.events import Block, Pose
 from fervor.session.start import Agreement, Layout
 
@@ -20,13 +20,13 @@ Read = Pose | FrameError
 """A frame's pose, or why it has none."""
 
 
-def read_poses(frames: Sequence[tuple[Agreement, RawFrame | Frame]]) -> list[Read]:
+def read_poses(frames: Sequence[tuple[Agreement, LeanFrame | Frame]]) -> list[Read]:
     """The pose of each frame, as its session's agreement has it, or the error of a poisoned one."""
     read: list[Read | None] = [None] * len(frames)
     blocks: dict[Layout, list[int]] = {}
     for place, (agreement, frame) in enumerate(frames):
         layout = agreement.layout
-        if layout is not None and isinstance(frame, RawFrame) and len(frame.q) == layout.size:
+        if layout is not None and isinstance(frame, LeanFrame) and len(frame.q) == layout.size:
             blocks.setdefault(layout, []).append(place)
     for layout, places in blocks.items():
         joints = b"".join([frames[place][1].q for place in places])  # type: ignore[misc]  # raw frames, as above
@@ -60,8 +60,8 @@ def _arranged(
     return arranged, seen
 
 
-def _plainly(agreement: Agreement, frame: RawFrame | Frame) -> Read:
+def _plainly(agreement: Agreement, frame: LeanFrame | Frame) -> Read:
     try:
-        return agreement.pose_of(frame.to_frame() if isinstance(frame, RawFrame) else frame)
+        return agreement.pose_of(frame.to_frame() if isinstance(frame, LeanFrame) else frame)
     except FrameError as error:
         return error

@@ -1,11 +1,11 @@
 """Errors as a client is told of them."""
 
 from fervor.errors import FervorError
+from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import Error, Frame
-from fervor.protocol.raw_frame import RawFrame
 
 
-def refusal(error: FervorError, frame: Frame | RawFrame | None = None) -> Error:
+def refusal(error: FervorError, frame: Frame | LeanFrame | None = None) -> Error:
     """The wire form of an error; one that a frame caused names the frame and ends nothing."""
     return Error(
         code=error.code,

@@ -8,6 +8,7 @@ Messages of frames may be offered to `prompt` first.
 from collections.abc import Iterable, Sequence
 
 from fervor.errors import CloseCode, EngineError, FervorError, FrameError, InputError, ProtocolError
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
@@ -22,7 +23,6 @@ from fervor.protocol.messages import (
     SessionStarted,
     Totals,
 )
-from fervor.protocol.raw_frame import RawFrame, RawFrames
 from fervor.session.body import Body
 from fervor.session.events import Close, Event, Outcome, Reply, Said, Source, Ticket
 from fervor.session.following import AnyFrame, Following
@@ -35,7 +35,7 @@ from fervor.session.state import SessionState, transition
 Rare = SessionStart | BodyReset | BodyEnd | SessionCalibrate | Ping | SessionEnd
 """What comes now and then."""
 
-Incoming = AnyFrame | Frames | RawFrames | Rare
+Incoming = AnyFrame | Frames | LeanFrames | Rare
 """A client's message, with frames in either form."""
 
 
@@ -83,15 +83,15 @@ class Session:
         """
         try:
             self.state = transition(self.state, message.type)
-            if isinstance(message, RawFrame | Frame):
+            if isinstance(message, LeanFrame | Frame):
                 return self._started.frame(message, poses[0] if poses else None)
-            if isinstance(message, RawFrames | Frames):
+            if isinstance(message, LeanFrames | Frames):
                 return self._started.frames(message.frames, poses)
             return self._dispatch(message)
         except FervorError as error:
             return self.refuse(error)
 
-    def prompt(self, message: RawFrame | RawFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
+    def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """The tickets of frames about which nothing is unusual, as nearly all are; none: `receive` is to take them.
 
         For a caller that runs the tickets, and hands their outcomes to `answer`, before anything else of this session:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from fervor.emotions import emotion_vector
 from fervor.errors import FrameError, InputError
 from fervor.metadata import ModelMetadata
+from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import Emotion, Frame, SessionStart
 from fervor.protocol.poses import frame_points, frame_pose
-from fervor.protocol.raw_frame import RawFrame
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
 from fervor.session.checkpoint import digest
@@ -64,7 +64,7 @@ class Agreement:
         """The label of a body that comes at `time` (seconds, client clock)."""
         return NO_LABEL if self.emotion is None else make_label(self.emotion, time, self.terms.emotion_ttl_s)
 
-    def time_of(self, frame: Frame | RawFrame) -> float:
+    def time_of(self, frame: Frame | LeanFrame) -> float:
         """The frame's time in seconds.
 
         Raises:

@@ -17,7 +17,7 @@ from fervor.protocol.trusted import trusted
 _Label = Annotated[str, Meta(max_length=32)]
 
 
-class RawFrame(Struct, tag_field="type", tag="frame", forbid_unknown_fields=True, frozen=True, gc=False):
+class LeanFrame(Struct, tag_field="type", tag="frame", forbid_unknown_fields=True, frozen=True, gc=False):
     """A `Frame` with raw joints in `q`, and no mask."""
 
     type: ClassVar[Literal["frame"]] = "frame"
@@ -42,21 +42,21 @@ class RawFrame(Struct, tag_field="type", tag="frame", forbid_unknown_fields=True
         return trusted(Frame, dict(fields))
 
 
-class RawFrames(Struct, tag_field="type", tag="frames", forbid_unknown_fields=True, frozen=True, gc=False):
+class LeanFrames(Struct, tag_field="type", tag="frames", forbid_unknown_fields=True, frozen=True, gc=False):
     """A `Frames` of nothing but such."""
 
     type: ClassVar[Literal["frames"]] = "frames"
-    frames: Annotated[tuple[RawFrame, ...], Meta(min_length=1, max_length=MOST_FRAMES)]
+    frames: Annotated[tuple[LeanFrame, ...], Meta(min_length=1, max_length=MOST_FRAMES)]
 
 
-_decode: Callable[[bytes], RawFrame | RawFrames] = msgspec.msgpack.Decoder(RawFrame | RawFrames).decode
+_decode: Callable[[bytes], LeanFrame | LeanFrames] = msgspec.msgpack.Decoder(LeanFrame | LeanFrames).decode
 
 
-def raw_frames(data: bytes) -> RawFrame | RawFrames | None:
+def lean_frames(data: bytes) -> LeanFrame | LeanFrames | None:
     """The message in MessagePack; None if it is another one, or not surely right."""
     try:
         came = _decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError):
         return None
-    frames = (came,) if isinstance(came, RawFrame) else came.frames
+    frames = (came,) if isinstance(came, LeanFrame) else came.frames
     return came if all(frame.t is None or isfinite(frame.t) for frame in frames) else None

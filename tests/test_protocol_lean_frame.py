@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fervor.protocol.codec import MsgpackCodec
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames, lean_frames
 from fervor.protocol.messages import Frame, Frames
-from fervor.protocol.raw_frame import RawFrame, RawFrames, raw_frames
 
 codec = MsgpackCodec()
 
@@ -22,23 +22,25 @@ usual = st.fixed_dictionaries(
 )
 
 
-def as_message(raw: RawFrame | RawFrames) -> Frame | Frames:
-    return raw.to_frame() if isinstance(raw, RawFrame) else Frames(frames=tuple(each.to_frame() for each in raw.frames))
+def as_message(raw: LeanFrame | LeanFrames) -> Frame | Frames:
+    return (
+        raw.to_frame() if isinstance(raw, LeanFrame) else Frames(frames=tuple(each.to_frame() for each in raw.frames))
+    )
 
 
 @given(message=usual)
 def test_a_usual_frame_is_that_of_the_plain_path(message) -> None:
     data = msgpack.packb(message)
-    raw = raw_frames(data)
-    assert isinstance(raw, RawFrame)
+    raw = lean_frames(data)
+    assert isinstance(raw, LeanFrame)
     assert repr(as_message(raw)) == repr(codec.decode_client(data))
 
 
 @given(messages=st.lists(usual, min_size=1, max_size=4))
 def test_so_are_several(messages) -> None:
     data = msgpack.packb({"type": "frames", "frames": messages})
-    raw = raw_frames(data)
-    assert isinstance(raw, RawFrames)
+    raw = lean_frames(data)
+    assert isinstance(raw, LeanFrames)
     assert as_message(raw) == codec.decode_client(data)
 
 
@@ -60,13 +62,13 @@ def test_so_are_several(messages) -> None:
 )
 def test_what_is_unusual_or_wrong_is_left_to_the_plain_path(change) -> None:
     frame = {"type": "frame", "seq": 1, "t": 0.0, "q": b"", **change}
-    assert raw_frames(msgpack.packb(frame)) is None
+    assert lean_frames(msgpack.packb(frame)) is None
     if change.get("type") is None:
-        assert raw_frames(msgpack.packb({"type": "frames", "frames": [frame]})) is None
+        assert lean_frames(msgpack.packb({"type": "frames", "frames": [frame]})) is None
 
 
 @given(data=st.binary(max_size=60))
 def test_no_bytes_raise(data: bytes) -> None:
     for head in (b"", b"\x83\xa4type\xa5frame\xa3seq\x01"):
-        raw = raw_frames(head + data)
+        raw = lean_frames(head + data)
         assert raw is None or as_message(raw) == codec.decode_client(head + data)
