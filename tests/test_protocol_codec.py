@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import MessageError
 from fervor.protocol.codec import JsonCodec, MsgpackCodec
+from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import ClientMessage, Estimate, Frame, Raw
 
 CODEC = JsonCodec()
@@ -124,3 +125,32 @@ def test_raw_joints_round_trip():
     assert PACKED.decode_client(PACKED.encode(frame)) == frame
     with pytest.raises(MessageError, match=r"frame\.q: input should be a valid"):
         CODEC.decode_client('{"type":"frame","seq":1,"t":0,"q":"12341234"}')
+
+
+@pytest.mark.parametrize(
+    ("codec", "data"),
+    [
+        (CODEC, '{"type":"frame","seq":1,"q":[null]}'),
+        (CODEC, '{"type":"frames","frames":[{"seq":1,"mask":[true]}]}'),
+        (PACKED, PACKED.encode(Frame(seq=1, q=Raw(b"1234")))),
+        (PACKED, msgpack.packb({"type": "frames", "frames": [{"seq": 1, "p": [[0.0, 0.0, 0.0]]}]})),
+    ],
+)
+def test_frames_are_had_lean_and_as_messages(codec, data):
+    lean = codec.decode_frames(data)
+    assert (lean.to_frame() if isinstance(lean, LeanFrame) else lean.to_frames()) == codec.decode_client(data)
+
+
+@pytest.mark.parametrize(
+    ("codec", "data"),
+    [
+        (CODEC, '{"type":"ping"}'),
+        (CODEC, '{"type":"frame","seq":-1}'),
+        (CODEC, b"{}"),
+        (PACKED, msgpack.packb({"type": "ping"})),
+        (PACKED, msgpack.packb({"type": "frame", "seq": -1})),
+        (PACKED, "{}"),
+    ],
+)
+def test_nothing_else_is_a_frame(codec, data):
+    assert codec.decode_frames(data) is None

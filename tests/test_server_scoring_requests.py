@@ -72,6 +72,17 @@ def test_both_encodings_and_both_readers_agree(asked: dict) -> None:
     assert scoring_requests._packed_quickly(packed)
 
 
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("asked", RIGHT.values(), ids=RIGHT)
+def test_frames_at_once_are_those_one_by_one(asked: dict, packed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = read_request(*((msgpack.packb(asked), MSGPACK[0]) if packed else (json.dumps(asked).encode(), JSON)))
+    quick = takes(read)
+    monkeypatch.setattr(scoring_requests, "_take_quickly", lambda *_: None)
+    for a, b in zip(quick, takes(read), strict=True):
+        for column in ("times", "rotations", "observed"):
+            assert getattr(a, column).tobytes() == getattr(b, column).tobytes()
+
+
 def test_raw_joints_are_those_of_numbers_of_single_precision() -> None:
     single = request([{"t": n / 30, "q": np.float64(np.float32(pose)).tolist()} for n, pose in enumerate(POSES)])
     packed = msgpack.packb(request(raw()))

@@ -1,6 +1,7 @@
 """A turn's messages pass each stage together, in the order in which they came."""
 
 import asyncio
+import json
 from collections.abc import Sequence
 
 import msgpack
@@ -11,9 +12,9 @@ from bodies import as_read, host, model, motion
 from fervor.engine.batcher import Batcher, Run
 from fervor.engine.engine import Engine
 from fervor.errors import EngineError, FervorError
-from fervor.protocol.codec import MsgpackCodec
+from fervor.protocol.codec import Codec, JsonCodec, MsgpackCodec
 from fervor.protocol.lean_frame import LeanFrame, LeanFrames
-from fervor.protocol.messages import Estimate
+from fervor.protocol.messages import Estimate, Frame
 from fervor.server.turn import Turn
 from fervor.session.events import Outcome, Reply, Ticket
 from fervor.session.poses import Read
@@ -26,8 +27,9 @@ CODEC = MsgpackCodec()
 class Talk:
     """A session that takes its messages from a turn."""
 
-    def __init__(self, batcher: Batcher) -> None:
+    def __init__(self, batcher: Batcher, codec: Codec = CODEC) -> None:
         self.batcher = batcher
+        self.codec = codec
         self.session = Session("s", host(batcher.engine.claim))
         self.said: list[object] = []
         self.in_blocks = 0
@@ -38,12 +40,12 @@ class Talk:
         return self.session.agreement
 
     def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
-        return CODEC.decode_frames(message)
+        return self.codec.decode_frames(message)
 
     def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         self.in_blocks += len(poses)
         try:
-            events = self.session.receive(raw or CODEC.decode_client(message), poses)
+            events = self.session.receive(raw or self.codec.decode_client(message), poses)
         except FervorError as error:
             events = self.session.refuse(error)
         self.carry(events)
@@ -73,6 +75,18 @@ class Talk:
 
 def start(**more) -> bytes:
     return msgpack.packb({"type": "session.start", "emotion": "joy", **more})
+
+
+def frames_of_arrays(seed: int, count: int) -> list[dict]:
+    """One joint of each is untracked, in one of three ways."""
+    poses = motion(count, seed=seed)
+    poses[::3, 2] = 0.0
+    frames = [{"type": "frame", "seq": seq, "t": seq / 25, "q": pose.tolist()} for seq, pose in enumerate(poses)]
+    for frame in frames[1::3]:
+        frame["q"][2] = None
+    for frame in frames[2::3]:
+        frame["mask"] = [joint != 2 for joint in range(13)]
+    return frames
 
 
 def frames(seed: int, count: int) -> list[bytes]:
@@ -110,6 +124,22 @@ async def test_estimates_are_those_of_the_plain_way_to_the_bit(batcher: Batcher)
     assert [talk.prompted for talk in together] == [39] * 12  # all but each body's first
     assert [talk.estimates() for talk in together] == [talk.estimates() for talk in alone]
     assert all(len(talk.estimates()) == 40 for talk in alone)
+
+
+async def test_so_are_those_of_json_and_of_arrays(batcher: Batcher) -> None:
+    turn, json_codec = Turn(batcher), JsonCodec()
+    texts, packed, alone = Talk(batcher, json_codec), Talk(batcher), Talk(batcher, json_codec)
+    for talk in (texts, packed, alone):
+        talk.carry(talk.session.receive(CODEC.decode_client(start())))
+    for frame in frames_of_arrays(3, 30):
+        turn.put(texts, json.dumps(frame))
+        turn.put(packed, msgpack.packb(frame))
+        await settle(batcher, turn)
+        alone.carry(alone.session.receive(Frame.model_validate_json(json.dumps(frame))))
+        batcher.run()
+    assert [talk.in_blocks for talk in (texts, packed)] == [30, 30]
+    assert texts.estimates() == packed.estimates() == alone.estimates()
+    assert len(alone.estimates()) == 30
 
 
 async def test_one_run_for_a_turn_and_none_for_nothing(batcher: Batcher) -> None:

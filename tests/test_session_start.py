@@ -16,7 +16,7 @@ def test_defaults_are_the_skeletons_own():
     agreement = agreed()
     assert agreement.joints[0] == "spine"
     assert (agreement.order, agreement.terms.source.axes) == ("xyzw", "local")
-    assert agreement.places is None
+    assert agreement.layout.places is None
 
 
 def test_a_subset_of_joints_in_the_clients_order():

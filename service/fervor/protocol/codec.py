@@ -13,8 +13,8 @@ from pydantic import TypeAdapter, ValidationError
 from fervor.errors import FrameError, MessageError
 from fervor.protocol.frame_decoder import frames_from_json, frames_from_msgpack
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
-from fervor.protocol.lean_frame import LeanFrame, LeanFrames, lean_frames
-from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
+from fervor.protocol.messages import PROTOCOL, ClientMessage, Frame, Frames, ServerMessage
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 _SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
@@ -39,7 +39,7 @@ class Codec(Protocol):
         """A message from the client; raises MessageError."""
 
     def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
-        """Frames with raw joints, for who takes many at once; None where it is any other message."""
+        """Frames, for who takes many at once; None where it is any other message, or not surely right."""
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -55,12 +55,12 @@ class JsonCodec:
 
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
-        frames = frames_from_json(data) if isinstance(data, str) else None
-        return frames or self._decode(_CLIENT, data)
+        lean = self.decode_frames(data)
+        return self._decode(_CLIENT, data) if lean is None else _plain(lean)
 
-    def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:  # noqa: ARG002  # see `Codec`
-        """None: JSON has no raw joints."""
-        return None
+    def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
+        """See `Codec`."""
+        return frames_from_json(data) if isinstance(data, str) else None
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -89,12 +89,12 @@ class MsgpackCodec:
 
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
-        frames = frames_from_msgpack(data) if isinstance(data, bytes) else None
-        return frames or self._decode(_CLIENT, data)
+        lean = self.decode_frames(data)
+        return self._decode(_CLIENT, data) if lean is None else _plain(lean)
 
     def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
-        """Frames with raw joints, for who takes many at once; None where it is any other message."""
-        return lean_frames(data) if isinstance(data, bytes) else None
+        """See `Codec`."""
+        return None if isinstance(data, str) else frames_from_msgpack(data)
 
     def decode_server(self, data: str | bytes) -> ServerMessage:
         """A message from the service; raises MessageError."""
@@ -127,6 +127,10 @@ KEEP_NULLS = frozenset({"estimate", "estimates", "frame", "frames"})
 
 CODECS: Mapping[str, Codec] = {codec.subprotocol: codec for codec in (JsonCodec(), MsgpackCodec())}
 """All codecs by subprotocol."""
+
+
+def _plain(lean: LeanFrame | LeanFrames) -> Frame | Frames:
+    return lean.to_frame() if isinstance(lean, LeanFrame) else lean.to_frames()
 
 
 def one_sentence(error: ValidationError) -> str:

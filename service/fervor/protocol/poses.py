@@ -22,7 +22,25 @@ UNTRACKED_BELOW = 0.5
 NOT_UNIT_ABOVE = 2.0
 """A quaternion longer than this is no rotation at all; a sender's bug, not noise."""
 
+SHORTEST_SQUARED, LONGEST_SQUARED = UNTRACKED_BELOW**2, NOT_UNIT_ABOVE**2
+"""The same of squared lengths, which spare a root."""
 
+_OF_WXYZ = np.array((1, 2, 3, 0))
+"""Where x, y, z, w stand in w, x, y, z."""
+
+
+def squared_lengths(rotations: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Of quaternions [..., 4]; to be called where numpy is told to overlook an overflow."""
+    squares: npt.NDArray[np.float64] = np.vecdot(rotations, rotations)
+    return squares
+
+
+def to_xyzw(rotations: npt.NDArray[np.float64], order: QuaternionOrder) -> npt.NDArray[np.float64]:
+    """Quaternions [..., 4] that came in some order."""
+    return rotations if order == "xyzw" else rotations.take(_OF_WXYZ, axis=-1)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # poison is told by a sentence, not by a warning
 def frame_pose(
     frame: Frame, joints: Sequence[str], order: QuaternionOrder
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
@@ -42,16 +60,17 @@ def frame_pose(
     if frame.p is not None:
         raise _refuse(frame, "has positions in p; expected quaternions in q alone, as this skeleton has rotations")
     rotations = _joints_of(frame, frame.q, "q", joints, 4)
-    lengths = _lengths(rotations, can_overflow=not isinstance(frame.q, Raw))
-    right = lengths <= NOT_UNIT_ABOVE
+    squares = squared_lengths(rotations)
+    right = squares <= LONGEST_SQUARED
     if not right.all():
         raise _refuse(frame, _bad_quaternion(rotations, joints, int(right.argmin())))
-    observed = lengths >= UNTRACKED_BELOW
+    observed = squares >= SHORTEST_SQUARED
     if frame.mask is not None:
         observed &= np.array(frame.mask)
-    return (rotations if order == "xyzw" else np.roll(rotations, -1, axis=-1)), observed
+    return to_xyzw(rotations, order), observed
 
 
+@np.errstate(invalid="ignore")
 def frame_points(frame: Frame, joints: Sequence[str]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
     """The positions of a frame of a landmark sensor.
 
@@ -80,15 +99,6 @@ def frame_points(frame: Frame, joints: Sequence[str]) -> tuple[npt.NDArray[np.fl
         where = f"joint {index} ({joints[index]})"
         raise _refuse(frame, f"has {positions[index].tolist()} at {where}; expected three finite numbers")
     return positions, ~untracked if frame.mask is None else ~untracked & np.array(frame.mask)
-
-
-def _lengths(rotations: npt.NDArray[np.float64], *, can_overflow: bool) -> npt.NDArray[np.float64]:
-    """Of quaternions [joint, 4]; what was a float32 can't overflow, and is spared the cost of `errstate`."""
-    if can_overflow:
-        with np.errstate(over="ignore"):
-            return _lengths(rotations, can_overflow=False)
-    lengths: npt.NDArray[np.float64] = np.sqrt(np.add.reduce(rotations * rotations, axis=-1))
-    return lengths
 
 
 def _joints_of(

@@ -16,9 +16,8 @@ from pydantic import ValidationError
 
 from fervor.errors import FrameError, RequestError
 from fervor.protocol.codec import one_sentence
-from fervor.protocol.messages import MOST_LABELS, Frame, Raw
-from fervor.protocol.pose_blocks import pose_block
-from fervor.protocol.skeleton_spec import MOST_JOINTS
+from fervor.protocol.lean_frame import LeanEmotion, LeanMask, LeanQuaternions, LeanVectors
+from fervor.protocol.messages import Frame, Raw
 from fervor.protocol.trusted import trusted
 from fervor.scoring.take import Take
 from fervor.server.scoring_models import (
@@ -31,44 +30,37 @@ from fervor.server.scoring_models import (
     ScoreTerms,
 )
 from fervor.session.start import Agreement
-from fervor.skeletons.landmarks import Landmarks
 
 MSGPACK = ("application/msgpack", "application/vnd.msgpack", "application/x-msgpack")
 """Content types of MessagePack; the first one is what we call it."""
 
 # The types of fervor.server.scoring_models once more, as msgspec says them; a test compares the two.
 
-_Label = Annotated[str, Meta(max_length=32)]
-_Emotion = _Label | Annotated[dict[_Label, float], Meta(max_length=MOST_LABELS)]
-_Quaternions = Annotated[tuple[tuple[float, float, float, float] | None, ...], Meta(max_length=MOST_JOINTS)]
-_Vectors = Annotated[tuple[tuple[float, float, float] | None, ...], Meta(max_length=MOST_JOINTS)]
-_Mask = Annotated[tuple[bool, ...], Meta(max_length=MOST_JOINTS)]
-
 
 class _JsonFrame(Struct, forbid_unknown_fields=True, gc=False):
     t: float | None = None
-    q: _Quaternions | None = None
-    p: _Vectors | None = None
-    mask: _Mask | None = None
+    q: LeanQuaternions | None = None
+    p: LeanVectors | None = None
+    mask: LeanMask | None = None
 
 
 class _PackedFrame(Struct, forbid_unknown_fields=True, gc=False):
     t: float | None = None
-    q: bytes | _Quaternions | None = None
-    p: bytes | _Vectors | None = None
-    mask: _Mask | None = None
+    q: bytes | LeanQuaternions | None = None
+    p: bytes | LeanVectors | None = None
+    mask: LeanMask | None = None
 
 
 class _JsonSequence(Struct, forbid_unknown_fields=True):
     frames: Annotated[tuple[_JsonFrame, ...], Meta(min_length=1)]
     name: Annotated[str, Meta(max_length=256)] = ""
-    emotion: _Emotion | None = None
+    emotion: LeanEmotion | None = None
 
 
 class _PackedSequence(Struct, forbid_unknown_fields=True):
     frames: Annotated[tuple[_PackedFrame, ...], Meta(min_length=1)]
     name: Annotated[str, Meta(max_length=256)] = ""
-    emotion: _Emotion | None = None
+    emotion: LeanEmotion | None = None
 
 
 AskedFrame = ScoreFrame | PackedScoreFrame | _JsonFrame | _PackedFrame
@@ -164,18 +156,13 @@ def take_of(number: int, sequence: AskedSequence, agreement: Agreement) -> Take:
 
 
 def _take_quickly(name: str, sequence: AskedSequence, agreement: Agreement) -> Take | None:
-    """All frames at once; None if some are unlike the others or not surely right."""
+    """All frames at once; None if some have no time or are not surely right."""
     frames: Sequence[AskedFrame] = sequence.frames
-    times, points = [frame.t for frame in frames], [frame.p for frame in frames]
-    if isinstance(agreement.terms.source.skeleton, Landmarks) or None in times or points.count(None) < len(points):
+    times = [frame.t for frame in frames]
+    block = agreement.layout.read(frames)
+    if None in times or block.doubtful:
         return None
-    block = pose_block(
-        [frame.q for frame in frames], [frame.mask for frame in frames], len(agreement.joints), agreement.order
-    )
-    if block is None:
-        return None
-    rotations, observed = agreement.arranged(*block)
-    return Take(name, np.array(times, np.float64), rotations, observed, sequence.emotion)
+    return Take(name, np.array(times, np.float64), block.joints, block.observed, sequence.emotion)
 
 
 def _take(name: str, sequence: AskedSequence, agreement: Agreement) -> Take:

@@ -1,9 +1,10 @@
 """What `session.start` asks for, checked and turned into what every frame needs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from fervor.errors import FrameError, InputError
 from fervor.metadata import ModelMetadata
 from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import Emotion, Frame, SessionStart
+from fervor.protocol.pose_blocks import PoseBlock, Sent, position_block, rotation_block
 from fervor.protocol.poses import frame_points, frame_pose
 from fervor.protocol.skeleton_spec import SkeletonSpec
 from fervor.session.body import Terms
@@ -25,21 +27,57 @@ from fervor.skeletons.landmarks import Landmarks
 from fervor.skeletons.skeleton import Axes, QuaternionOrder, Skeleton
 
 
+class SentJoints(Protocol):
+    """The joints of a frame, as they came."""
+
+    @property
+    def q(self) -> Sent:
+        """Rotations."""
+
+    @property
+    def p(self) -> Sent:
+        """Positions."""
+
+    @property
+    def mask(self) -> Sequence[bool] | None:
+        """Which are tracked."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """How raw rotations lie in a frame; one object for all sessions that agreed on the same."""
+    """How joints lie in a frame; one object for all sessions that agreed on the same."""
 
+    rotations: bool
+    """Else positions."""
     joints: int
     """Sent."""
     order: QuaternionOrder
     known: int
-    """Joints of the skeleton."""
-    places: npt.NDArray[np.intp] | None  # [joint sent] as of an agreement
+    """Joints of the source."""
+    places: npt.NDArray[np.intp] | None
+    """[joint sent] its place in the source; None where all are sent in the source's order."""
 
-    @property
-    def size(self) -> int:
-        """Bytes of a frame's joints."""
-        return 16 * self.joints
+    def read(self, frames: Sequence[SentJoints]) -> PoseBlock:
+        """The joints of frames at once, in the order of the source; those that are not sent are unobserved."""
+        masks = [frame.mask for frame in frames]
+        if self.rotations:
+            rotations = [frame.q if frame.p is None else None for frame in frames]
+            block = rotation_block(rotations, masks, self.joints, self.order)
+        else:
+            positions = [frame.p if frame.q is None else None for frame in frames]
+            block = position_block(positions, masks, self.joints)
+        return PoseBlock(*self.arranged(block.joints, block.observed), block.doubtful)
+
+    def arranged(
+        self, joints: npt.NDArray[np.float64], observed: npt.NDArray[np.bool_]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+        """Joints as they were sent, [..., joint, k] and [..., joint], in the order of the source; others unobserved."""
+        if self.places is None:
+            return joints, observed
+        arranged = np.zeros((*joints.shape[:-2], self.known, joints.shape[-1]))
+        seen = np.zeros(arranged.shape[:-1], np.bool_)
+        arranged[..., self.places, :], seen[..., self.places] = joints, observed
+        return arranged, seen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,10 +93,7 @@ class Agreement:
     emotion: Emotion | None
     frame_s: float
     """Seconds a frame stands for where it brings no time (clock `frames`)."""
-    places: npt.NDArray[np.intp] | None
-    """[joint sent] its place in the skeleton; None where all are sent in the skeleton's order."""
-    layout: Layout | None
-    """None of a landmark sensor."""
+    layout: Layout
 
     def first_label(self, time: float) -> Label:
         """The label of a body that comes at `time` (seconds, client clock)."""
@@ -110,19 +145,7 @@ class Agreement:
             joints, observed = frame_points(frame, self.joints)
         else:
             joints, observed = frame_pose(frame, self.joints, self.order)
-        return Pose(*self.arranged(joints, observed))
-
-    def arranged(
-        self, joints: npt.NDArray[np.float64], observed: npt.NDArray[np.bool_]
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-        """Joints as they were sent, [..., joint, k] and [..., joint], in the order of the source."""
-        if self.places is None:
-            return joints, observed
-        count = len(self.terms.source.skeleton.joints)
-        arranged = np.zeros((*joints.shape[:-2], count, joints.shape[-1]))
-        seen = np.zeros(arranged.shape[:-1], np.bool_)
-        arranged[..., self.places, :], seen[..., self.places] = joints, observed
-        return arranged, seen
+        return Pose(*self.layout.arranged(joints, observed))
 
     def aligned(self, skeleton: Skeleton) -> "Agreement":
         """The same agreement for the same sensor under another alignment."""
@@ -161,8 +184,7 @@ def agree(
         latest=start.delivery == "latest",
         emotion=start.emotion,
         frame_s=1.0 / (start.nominal_hz or metadata.rate_hz),
-        places=places,
-        layout=None if isinstance(known, Landmarks) else _layout(len(joints), order, len(known.joints), among),
+        layout=_layout(isinstance(known, Skeleton), len(joints), order, len(known.joints), among),
     )
 
 
@@ -173,8 +195,8 @@ def _source(skeleton: Skeleton | Landmarks, axes: Axes) -> Source:
 
 
 @lru_cache(maxsize=64)
-def _layout(joints: int, order: QuaternionOrder, known: int, places: tuple[int, ...] | None) -> Layout:
-    return Layout(joints, order, known, None if places is None else np.array(places, np.intp))
+def _layout(rotations: bool, joints: int, order: QuaternionOrder, known: int, places: tuple[int, ...] | None) -> Layout:
+    return Layout(rotations, joints, order, known, None if places is None else np.array(places, np.intp))
 
 
 def _known(asked: str | SkeletonSpec, skeletons: Mapping[str, Skeleton]) -> Skeleton | Landmarks:
