@@ -10,7 +10,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from fervor.errors import MessageError
 from fervor.protocol.codec import JsonCodec, MsgpackCodec
-from fervor.protocol.lean_frame import LeanFrame
 from fervor.protocol.messages import ClientMessage, Estimate, Frame, Raw
 
 CODEC = JsonCodec()
@@ -138,7 +137,7 @@ def test_raw_joints_round_trip():
 )
 def test_frames_are_had_lean_and_as_messages(codec, data):
     lean = codec.decode_frames(data)
-    assert (lean.to_frame() if isinstance(lean, LeanFrame) else lean.to_frames()) == codec.decode_client(data)
+    assert lean.to_message() == codec.decode_client(data)
 
 
 @pytest.mark.parametrize(

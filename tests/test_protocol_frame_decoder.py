@@ -51,7 +51,7 @@ def messages(fields):
 
 
 def fully(lean: LeanFrame | LeanFrames | None) -> Frame | Frames | None:
-    return lean.to_frames() if isinstance(lean, LeanFrames) else lean and lean.to_frame()
+    return lean and lean.to_message()
 
 
 def plainly(kind: str, data: str | bytes) -> object:

@@ -13,19 +13,19 @@ JOINTS = ((0.0, 0.0, 0.0, 1.0), None)
 @pytest.mark.parametrize("kind", [LeanFrame, LeanJsonFrame])
 def test_the_same_as_any_other_frame(kind: type[LeanFrame]) -> None:
     lean, frame = kind(q=JOINTS, **FIELDS), Frame(q=JOINTS, **FIELDS)
-    assert lean.to_frame() == frame
-    assert repr(lean.to_frame()) == repr(frame)
-    assert (lean.type, kind(seq=1).to_frame()) == ("frame", Frame(seq=1))
+    assert lean.to_message() == frame
+    assert repr(lean.to_message()) == repr(frame)
+    assert (lean.type, kind(seq=1).to_message()) == ("frame", Frame(seq=1))
 
 
 def test_raw_joints_are_wrapped() -> None:
     lean = LeanFrame(q=b"1234", p=b"", **FIELDS)
-    assert lean.to_frame() == Frame(q=Raw(b"1234"), p=Raw(b""), **FIELDS)
+    assert lean.to_message() == Frame(q=Raw(b"1234"), p=Raw(b""), **FIELDS)
 
 
 def test_several() -> None:
     lean = LeanFrames((LeanFrame(seq=1), LeanFrame(seq=2, q=JOINTS)))
-    assert lean.to_frames() == Frames(frames=(Frame(seq=1), Frame(seq=2, q=JOINTS)))
+    assert lean.to_message() == Frames(frames=(Frame(seq=1), Frame(seq=2, q=JOINTS)))
     assert lean.type == "frames"
 
 

@@ -34,7 +34,7 @@ SMALL = (2, 5)
 
 def plainly(agreement: Agreement, frame: LeanFrame | Frame) -> Pose | FrameError:
     try:
-        return agreement.pose_of(frame.to_frame() if isinstance(frame, LeanFrame) else frame)
+        return agreement.pose_of(frame.to_message() if isinstance(frame, LeanFrame) else frame)
     except FrameError as error:
         return error
 

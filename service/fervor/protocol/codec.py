@@ -14,7 +14,7 @@ from fervor.errors import FrameError, MessageError
 from fervor.protocol.frame_decoder import frames_from_json, frames_from_msgpack
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.lean_frame import LeanFrame, LeanFrames
-from fervor.protocol.messages import PROTOCOL, ClientMessage, Frame, Frames, ServerMessage
+from fervor.protocol.messages import PROTOCOL, ClientMessage, ServerMessage
 
 _CLIENT: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 _SERVER: TypeAdapter[ServerMessage] = TypeAdapter(ServerMessage)
@@ -56,7 +56,7 @@ class JsonCodec:
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
         lean = self.decode_frames(data)
-        return self._decode(_CLIENT, data) if lean is None else _plain(lean)
+        return self._decode(_CLIENT, data) if lean is None else lean.to_message()
 
     def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
         """See `Codec`."""
@@ -90,7 +90,7 @@ class MsgpackCodec:
     def decode_client(self, data: str | bytes) -> ClientMessage:
         """A message from the client; raises MessageError saying which field is wrong and what was expected."""
         lean = self.decode_frames(data)
-        return self._decode(_CLIENT, data) if lean is None else _plain(lean)
+        return self._decode(_CLIENT, data) if lean is None else lean.to_message()
 
     def decode_frames(self, data: str | bytes) -> LeanFrame | LeanFrames | None:
         """See `Codec`."""
@@ -127,10 +127,6 @@ KEEP_NULLS = frozenset({"estimate", "estimates", "frame", "frames"})
 
 CODECS: Mapping[str, Codec] = {codec.subprotocol: codec for codec in (JsonCodec(), MsgpackCodec())}
 """All codecs by subprotocol."""
-
-
-def _plain(lean: LeanFrame | LeanFrames) -> Frame | Frames:
-    return lean.to_frame() if isinstance(lean, LeanFrame) else lean.to_frames()
 
 
 def one_sentence(error: ValidationError) -> str:

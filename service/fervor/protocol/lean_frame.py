@@ -34,8 +34,8 @@ class LeanFrame(Struct, tag_field="type", tag="frame", forbid_unknown_fields=Tru
     mask: LeanMask | None = None
     emotion: LeanEmotion | None = None
 
-    def to_frame(self) -> Frame:
-        """The same as any other frame."""
+    def to_message(self) -> Frame:
+        """The same as any other message."""
         fields = {
             "type": "frame",
             "body": self.body,
@@ -62,9 +62,9 @@ class LeanFrames(Struct, tag_field="type", tag="frames", forbid_unknown_fields=T
     type: ClassVar[Literal["frames"]] = "frames"
     frames: Annotated[tuple[LeanFrame, ...], Meta(min_length=1, max_length=MOST_FRAMES)]
 
-    def to_frames(self) -> Frames:
-        """The same as any other frames."""
-        return trusted(Frames, {"type": "frames", "frames": tuple(frame.to_frame() for frame in self.frames)})
+    def to_message(self) -> Frames:
+        """The same as any other message."""
+        return trusted(Frames, {"type": "frames", "frames": tuple(frame.to_message() for frame in self.frames)})
 
 
 class LeanJsonFrames(LeanFrames, tag="frames", frozen=True, gc=False):

@@ -28,10 +28,10 @@ class Taker(Protocol):
         """What its session agreed on; None before the start."""
 
     def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
-        """The message as raw frames; None where it is anything else."""
+        """The message as lean frames; None where it is anything else."""
 
     def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
-        """Do what the message asks; of raw frames, the poses were read already. Never raises."""
+        """Do what the message asks; of lean frames, the poses were read already. Never raises."""
 
     def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """The tickets of frames about which nothing is unusual; none, having done nothing: `take` is to see them."""
@@ -94,7 +94,7 @@ class _Ready(NamedTuple):
 
 
 def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
-    """Decode messages, and read the poses of raw frames together.
+    """Decode messages, and read the poses of frames together.
 
     Frames behind a `session.start` in the same turn have no agreement yet; their session reads them.
     """

@@ -45,6 +45,6 @@ def _read_block(layout: Layout, frames: Sequence[LeanFrame]) -> list[Pose | None
 
 def _plainly(agreement: Agreement, frame: LeanFrame) -> Read:
     try:
-        return agreement.pose_of(frame.to_frame())
+        return agreement.pose_of(frame.to_message())
     except FrameError as error:
         return error
