@@ -17,7 +17,8 @@ from bodies import as_read, host, model, motion
 from fervor.engine.engine import Engine
 from fervor.errors import CloseCode, FervorError
 from fervor.protocol.asyncapi import FROM_WEBSOCKET
-from fervor.protocol.codec import CODECS
+from fervor.protocol.codec import CODECS, Codec
+from fervor.protocol.lean_frame import LeanFrames
 from fervor.protocol.messages import (
     BodyEnd,
     BodyReset,
@@ -29,7 +30,8 @@ from fervor.protocol.messages import (
     SessionEnd,
     SessionStart,
 )
-from fervor.session.events import Close, Release, Reply, Restore, Ticket
+from fervor.session.events import Close, Event, Release, Reply, Restore, Ticket
+from fervor.session.poses import read_poses
 from fervor.session.session import Session
 from fervor.session.state import SessionState
 from live import Live, RawClient, eventually, frames_of, talk
@@ -209,6 +211,7 @@ class Edge:
         self.work: list[Ticket] = []
         self.answers = 0
         self.closed: list[Close] = []
+        self.said: list[object] = []
 
     def carry(self, events) -> None:
         for event in events:
@@ -234,6 +237,7 @@ class Edge:
     def _heard(self, message) -> None:
         assert not self.closed, "nothing is said after the close"
         read = as_read(message)
+        self.said.append(read)
         assert all(codec.decode_server(codec.encode(message)) == read for codec in CODECS.values())
         self.answers += len(read.estimates) if isinstance(read, Estimates) else read.type == "estimate"
         self.answers += message.type == "error" and message.seq is not None
@@ -261,3 +265,27 @@ def test_any_messages_in_any_order(opened, messages, dice) -> None:
     assert edge.engine.slots.taken == 0
     assert len(edge.closed) <= 1
     assert edge.session.refuse(FervorError("x")) == []
+
+
+@settings(max_examples=100, deadline=None)
+@given(messages=st.lists(said, max_size=15), encoding=st.sampled_from(sorted(CODECS)))
+def test_frames_off_the_wire_are_answered_as_those_that_pydantic_made(messages, encoding) -> None:
+    """To the bit: lean frames whose poses were read in blocks, beside the same messages one by one."""
+    codec, plain, lean = CODECS[encoding], Edge(), Edge()
+    for message in [SessionStart(), *messages]:
+        plain.carry(plain.session.receive(message))
+        lean.carry(taken(lean.session, codec, codec.encode(message)))
+        for edge in (plain, lean):
+            edge.toil()
+    assert lean.said == plain.said
+    assert lean.closed == plain.closed
+    assert lean.session.totals == plain.session.totals
+
+
+def taken(session: Session, codec: Codec, data: str | bytes) -> list[Event]:
+    """What a message brings that is taken as a turn takes it."""
+    frames, agreement = codec.decode_frames(data), session.agreement
+    if frames is None or agreement is None:
+        return session.receive(codec.decode_client(data))
+    each = frames.frames if isinstance(frames, LeanFrames) else (frames,)
+    return session.receive(frames, read_poses([(agreement, frame) for frame in each]))
