@@ -42,10 +42,10 @@ class Talk:
     def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
         return self.codec.decode_frames(message)
 
-    def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
+    def take(self, message: str | bytes, lean: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         self.in_blocks += len(poses)
         try:
-            events = self.session.receive(raw or self.codec.decode_client(message), poses)
+            events = self.session.receive(lean or self.codec.decode_client(message), poses)
         except FervorError as error:
             events = self.session.refuse(error)
         self.carry(events)

@@ -90,13 +90,13 @@ class Conversation(Life):
         """See `Taker`."""
         return self._codec.decode_frames(message)
 
-    def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
+    def take(self, message: str | bytes, lean: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         """See `Taker`."""
         self._in_turn -= 1
         if self._room is not None:
             self._make_room()
         if self._session.state is not SessionState.CLOSED:
-            self._act_on(message, raw, poses)
+            self._act_on(message, lean, poses)
 
     def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
         """See `Taker`."""
@@ -122,19 +122,21 @@ class Conversation(Life):
         except Exception as fault:  # noqa: BLE001  # as below
             self._give_up(fault)
 
-    def _act_on(self, data: str | bytes, raw: LeanFrame | LeanFrames | None = None, poses: Sequence[Read] = ()) -> None:
+    def _act_on(
+        self, data: str | bytes, lean: LeanFrame | LeanFrames | None = None, poses: Sequence[Read] = ()
+    ) -> None:
         if self._leaving:
             return  # what comes now is after the last checkpoint: the client sends it again where it resumes
         try:
-            self._carry_out(self._understand(data, raw, poses))
+            self._carry_out(self._understand(data, lean, poses))
         except Exception as fault:  # noqa: BLE001  # a fault of ours ends this session with a word, and no other
             self._give_up(fault)
 
-    def _understand(self, data: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> list[Event]:
+    def _understand(self, data: str | bytes, lean: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> list[Event]:
         """What a message brings. Whatever it is, it counts as a frame of the pace, at least."""
         try:
             self._pace.take(1, self._heard)
-            message = raw or self._decode(data)
+            message = lean or self._decode(data)
             if isinstance(message, LeanFrames | Frames):
                 more = min(len(message.frames), self._settings.max_frames_per_message) - 1
                 self._pace.take(more, self._heard)

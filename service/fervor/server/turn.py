@@ -30,7 +30,7 @@ class Taker(Protocol):
     def decode_frames(self, message: str | bytes) -> LeanFrame | LeanFrames | None:
         """The message as lean frames; None where it is anything else."""
 
-    def take(self, message: str | bytes, raw: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
+    def take(self, message: str | bytes, lean: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         """Do what the message asks; of lean frames, the poses were read already. Never raises."""
 
     def prompt(self, message: LeanFrame | LeanFrames, poses: Sequence[Read]) -> Sequence[Ticket]:
@@ -73,13 +73,13 @@ class Turn:
         prompt: dict[Taker, Sequence[Ticket]] = {}
         later = []
         for each in ready:
-            taker, message, raw, poses = each
+            taker, message, lean, poses = each
             if taker in prompt:
                 later.append(each)
-            elif raw and poses and (tickets := taker.prompt(raw, poses)):
+            elif lean and poses and (tickets := taker.prompt(lean, poses)):
                 prompt[taker] = tickets
             else:
-                taker.take(message, raw, poses)
+                taker.take(message, lean, poses)
         outcomes = iter(self._batcher.run([ticket for tickets in prompt.values() for ticket in tickets]))
         for taker, tickets in prompt.items():
             taker.answer(tickets, list(islice(outcomes, len(tickets))))
@@ -89,7 +89,7 @@ class Turn:
 class _Ready(NamedTuple):
     taker: Taker
     message: str | bytes
-    raw: LeanFrame | LeanFrames | None
+    lean: LeanFrame | LeanFrames | None
     poses: Sequence[Read]
 
 
@@ -101,16 +101,16 @@ def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
     decoded = [(taker, message, taker.decode_frames(message), taker.agreement) for taker, message in came]
     frames = [
         (agreement, frame)
-        for _, _, raw, agreement in decoded
-        if raw is not None and agreement is not None
-        for frame in _frames_of(raw)
+        for _, _, lean, agreement in decoded
+        if lean is not None and agreement is not None
+        for frame in _frames_of(lean)
     ]
     poses = iter(read_poses(frames))
     return [
-        _Ready(taker, message, raw, list(islice(poses, len(_frames_of(raw)))) if raw and agreement else ())
-        for taker, message, raw, agreement in decoded
+        _Ready(taker, message, lean, list(islice(poses, len(_frames_of(lean)))) if lean and agreement else ())
+        for taker, message, lean, agreement in decoded
     ]
 
 
-def _frames_of(raw: LeanFrame | LeanFrames) -> tuple[LeanFrame, ...]:
-    return (raw,) if isinstance(raw, LeanFrame) else raw.frames
+def _frames_of(lean: LeanFrame | LeanFrames) -> tuple[LeanFrame, ...]:
+    return (lean,) if isinstance(lean, LeanFrame) else lean.frames

@@ -379,7 +379,7 @@ def _is_known(emotion: str | Mapping[str, float]) -> bool:
 
 
 def _plain(frame: AnyFrame) -> Frame:
-    return frame.to_frame() if isinstance(frame, LeanFrame) else frame
+    return frame.to_message() if isinstance(frame, LeanFrame) else frame
 
 
 def _replies(gone: tuple[str, InputError | None]) -> list[Event]:
