@@ -81,7 +81,7 @@ class _Joints(msgspec.Struct, frozen=True, eq=False, gc=False):
 
     numbers: npt.NDArray[np.float64]  # [frame, joint, width], zero where null
     seen: npt.NDArray[np.bool_] | None
-    """[frame, joint] neither null nor masked; None where all are."""
+    """[frame, joint] neither null nor masked, so far as the numbers don't tell; None where all are."""
     doubtful: set[int]
 
 
@@ -122,7 +122,7 @@ def _from_raw(raw: Sequence[bytes], joints: int, width: int) -> _Joints:
         doubtful = {row for row, each in enumerate(raw) if len(each) != size}
         raw = [bytes(size) if len(each) != size else each for each in raw]
     numbers = np.frombuffer(b"".join(raw), "<f4").astype(np.float64).reshape(-1, joints, width)
-    if width == 4:  # quaternions are untracked where they are short
+    if width == 4:  # a quaternion of zeros is untracked as it is
         return _Joints(numbers, None, doubtful)
     seen = np.logical_not(np.isnan(numbers).any(axis=-1))
     numbers[~seen] = 0.0
@@ -138,9 +138,9 @@ def _from_arrays(sent: Sequence[Any], joints: int, width: int) -> _Joints:
             if all(each):
                 packed.append(pack(*_flat(each)))
                 flags.append(every)
-            else:  # joints that are null
+            else:  # joints that are null; a quaternion of zeros is untracked as it is
                 packed.append(pack(*_flat([joint or hole for joint in each])))
-                flags.append(bytes([joint is not None for joint in each]))
+                flags.append(every if width == 4 else bytes([joint is not None for joint in each]))
         except (TypeError, struct.error):  # nothing there, or too many or few
             packed.append(bytes(8 * joints * width))
             flags.append(b"")
