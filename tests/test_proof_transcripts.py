@@ -11,6 +11,7 @@ import pytest
 from fervor.errors import CloseCode, MessageError, Unreachable
 from fervor.protocol.codec import CODECS
 from fervor.protocol.messages import ClientMessage, Estimate, ServerMessage, SessionStart
+from fervor.settings import Transport
 from fervor_client.conversation import Conversation
 from fervor_client.retrying import Retries
 from transcripts import FOLDER, Line, Player, differs, filled, load
@@ -31,9 +32,11 @@ def lines_of(kind: str) -> Iterator[Line]:
     return (line for lines in ALL.values() for line in lines if kind in line)
 
 
+@pytest.mark.parametrize("way", get_args(Transport))
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_the_service_says_what_the_transcript_says(path: Path) -> None:
-    asyncio.run(Player(load(path)).play())
+def test_the_service_says_what_the_transcript_says(path: Path, way: Transport) -> None:
+    about, *lines = load(path)
+    asyncio.run(Player([{**about, "settings": {**about["settings"], "transport": way}}, *lines]).play())
 
 
 def test_they_cover_the_protocol() -> None:
