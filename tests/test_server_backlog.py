@@ -1,6 +1,7 @@
 """When too much waits for the model, sessions are read no further; nothing is lost."""
 
 import asyncio
+from functools import partial
 
 from bodies import motion
 from fervor.engine.batcher import Run
@@ -19,10 +20,25 @@ class Queue:
     def watch(self, watcher) -> None:
         self.watchers.append(watcher)
 
+    def run(self) -> None:
+        """Nothing waits, so no run follows."""
+
     def run_down_to(self, depth: int) -> None:
         self.depth = depth
         for watcher in self.watchers:
             watcher(Run(1, 0.0, 0.0))
+
+
+class Silent:
+    """A conversation that brings nothing."""
+
+    agreement = None
+
+    def decode_raw(self, message) -> None:
+        return None
+
+    def take(self, message, raw, poses) -> None:
+        pass
 
 
 async def test_who_waits_comes_on_one_by_one() -> None:
@@ -31,24 +47,31 @@ async def test_who_waits_comes_on_one_by_one() -> None:
     queue.depth = 10
     passed: list[int] = []
 
-    async def session(number: int) -> None:
-        await backlog.wait()
+    def bring(number: int) -> None:
         queue.depth += 5
         passed.append(number)
 
-    waiting = [asyncio.create_task(session(number)) for number in range(3)]
-    await asyncio.sleep(0)
+    for number in range(3):
+        backlog.wait(partial(bring, number))
     queue.run_down_to(10)
-    await asyncio.sleep(0)
     assert passed == []
     queue.run_down_to(6)
-    for _ in range(3):
-        await asyncio.sleep(0)
     assert passed == [0]  # it filled the queue again, and the others saw it
     queue.run_down_to(0)
-    await asyncio.gather(*waiting)
     assert passed == [0, 1, 2]
     assert queue.depth == 10
+
+
+async def test_a_turn_that_brings_no_tickets_leaves_nobody_waiting() -> None:
+    queue = Queue()
+    turn = Turn(queue)
+    backlog = Backlog(queue, turn, most=1)
+    turn.put(Silent(), "a ping")
+    assert backlog.full
+    room = asyncio.Event()
+    backlog.wait(room.set)
+    await room.wait()
+    assert not backlog.full
 
 
 async def test_a_short_queue_changes_no_estimate(start_service) -> None:

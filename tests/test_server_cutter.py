@@ -6,11 +6,13 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from websockets.client import ClientProtocol
 from websockets.frames import Frame, Opcode
 from websockets.protocol import OPEN
 from websockets.server import ServerProtocol
+from websockets.uri import parse_uri
 
-from fervor.server.cutter import Cutter, Message
+from fervor.server.cutter import Cutter, Message, as_frame, whole
 
 MOST = 70_000
 
@@ -70,18 +72,25 @@ def pieces(data: bytes, cuts: list[int]) -> list[bytes]:
 
 @given(stream=STREAMS, cuts=st.lists(st.integers(0, 10**6), max_size=6))
 def test_it_finds_what_a_complete_parser_finds(stream: bytes, cuts: list[int]) -> None:
-    whole = Parser()
-    whole.feed(stream)
+    complete = Parser()
+    complete.feed(stream)
     rest, cutter = Parser(), Cutter(most_bytes=MOST)
     for piece in pieces(stream, cuts):
-        message = cutter.whole(piece)
-        for part in cutter.cut(piece) if message is None else [Message(message, is_text=False)]:
+        for part in _parts(cutter, piece):
             if isinstance(part, bytes):
                 rest.feed(part)
             elif rest.open:  # a parser that has failed, or was told good-bye, takes nothing more
                 rest.found.append((Opcode.TEXT if part.is_text else Opcode.BINARY, True, part.payload))
-    assert rest.found == whole.found
-    assert rest.failed == whole.failed
+    assert rest.found == complete.found
+    assert rest.failed == complete.failed
+
+
+def _parts(cutter: Cutter, piece: bytes) -> list[Message | bytes]:
+    """The parts of a piece, by the fast way where it may be taken."""
+    message = whole(piece, MOST) if cutter.at_rest else None
+    if message is None:
+        return list(cutter.cut(piece))
+    return [Message(message.encode() if isinstance(message, str) else message, is_text=isinstance(message, str))]
 
 
 def test_a_whole_message_never_reaches_the_complete_parser() -> None:
@@ -93,11 +102,42 @@ def test_a_whole_message_never_reaches_the_complete_parser() -> None:
 
 
 def test_what_comes_alone_and_whole_is_found_without_cutting() -> None:
-    cutter = Cutter(most_bytes=MOST)
     for payload in (b"", b"two", b"x" * 125, b"x" * 126, b"x" * 65_535):
-        assert cutter.whole(frame(0x82, payload, b"efgh")) == payload
-    for other in (frame(0x81, b"text", b"efgh"), frame(0x82, b"bare", None), frame(0x82, b"", b"efgh")[:-1], b"\x82"):
-        assert cutter.whole(other) is None
+        assert whole(frame(0x82, payload, b"efgh"), MOST) == payload
+        assert whole(frame(0x81, payload, b"efgh"), MOST) == payload.decode()
+    assert whole(frame(0x81, "größer".encode(), b"efgh"), MOST) == "größer"
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        b"",
+        b"\x82",
+        frame(0x82, b"bare", None),
+        frame(0x82, b"", b"efgh")[:-1],
+        frame(0x82, b"x" * 126, b"efgh")[:7],
+        frame(0x82, b"one", b"efgh") + b"\x82",
+        frame(0x02, b"a piece", b"efgh"),
+        frame(0x89, b"ping", b"efgh"),
+        frame(0xC1, b"compressed", b"efgh"),
+        frame(0x81, b"\xff\xfe", b"efgh"),
+        frame(0x82, b"x" * 65_536, b"efgh"),
+        frame(0x82, b"x" * 1001, b"efgh"),
+    ],
+)
+def test_all_else_is_left_to_be_cut(other: bytes) -> None:
+    assert whole(other, 1000) is None
+
+
+@given(message=st.text() | st.binary() | st.sampled_from([125, 126, 65_535, 65_536]).map(bytes))
+def test_a_frame_made_is_read_as_its_message(message: str | bytes) -> None:
+    client = ClientProtocol(parse_uri("ws://x"), state=OPEN, max_size=None)
+    client.receive_data(as_frame(message))
+    (event,) = client.events_received()
+    assert isinstance(event, Frame)
+    assert event.fin
+    assert event.opcode is (Opcode.TEXT if isinstance(message, str) else Opcode.BINARY)
+    assert event.data == (message.encode() if isinstance(message, str) else message)
 
 
 def test_after_a_frame_that_was_passed_on_it_finds_messages_again() -> None:

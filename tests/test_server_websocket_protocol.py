@@ -10,6 +10,8 @@ from contextlib import suppress
 import pytest
 
 from bodies import motion
+from fervor.server.direct_wire import DirectWire
+from fervor.server.websocket_protocol import GuardedWebSocket
 from fervor.settings import Transport
 from live import Live, RawClient, eventually, frames_of, talk
 
@@ -160,6 +162,7 @@ async def test_a_client_that_never_shakes_hands_is_shown_the_door(start_service)
 async def test_who_never_takes_his_close_is_cut(start_service, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fervor.server.life.CLOSE_GRACE_S", 0.2)
     monkeypatch.setattr("fervor.server.websocket_protocol.LEFT_BEHIND_S", 0.2)
+    monkeypatch.setattr("fervor.server.direct_wire.LEFT_BEHIND_S", 0.2)
     service = start_service(max_unsent_bytes=100_000, max_frames_per_second=1e9)
     deaf = RawClient(service)
     with deaf.socket:
@@ -198,7 +201,7 @@ async def test_a_connection_takes_the_way_that_was_set(live: Live, transport: Tr
     async with talk(live) as stream:
         await stream.start()
         (connection,) = live_connections(live)
-        assert (connection.take is not None) == (transport == "direct")
+        assert isinstance(connection, DirectWire if transport == "direct" else GuardedWebSocket)
 
 
 async def test_bytes_that_come_one_by_one_change_no_bit(start_service) -> None:

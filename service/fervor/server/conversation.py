@@ -38,6 +38,8 @@ BYTES_A_FRAME = 1024
 class Conversation(Life):
     """A session and its wire."""
 
+    __slots__ = ("_codec", "_latest", "_leaving", "_pace")
+
     def __init__(self, wire: Wire, service: Service, codec: Codec, *, client: str | None = None) -> None:
         """Begin.
 
@@ -49,7 +51,6 @@ class Conversation(Life):
         """
         super().__init__(wire, service, client=client)
         self._codec = codec
-        self._batcher = service.batcher
         self._leaving = False
         self._latest = False  # whether the client wants the newest estimates only
         self._pace = Pace(service.settings.max_frames_per_second, service.settings.max_frames_per_message)
@@ -93,7 +94,7 @@ class Conversation(Life):
     def take(self, message: str | bytes, lean: LeanFrame | LeanFrames | None, poses: Sequence[Read]) -> None:
         """See `Taker`."""
         self._in_turn -= 1
-        if self._room is not None:
+        if self._waits_for_answers:
             self._make_room()
         if self._session.state is not SessionState.CLOSED:
             self._act_on(message, lean, poses)
@@ -113,7 +114,7 @@ class Conversation(Life):
 
     def answer(self, tickets: Sequence[Ticket], outcomes: Sequence[Outcome | EngineError]) -> None:
         """See `Taker`."""
-        if self._room is not None:
+        if self._waits_for_answers:
             self._make_room()
         try:
             for said in self._session.answer(tickets, outcomes):
@@ -215,7 +216,7 @@ class Conversation(Life):
 
     def _deliver(self, ticket: Ticket, outcome: Outcome | EngineError) -> None:
         self._unanswered -= 1
-        if self._room is not None:
+        if self._waits_for_answers:
             self._make_room()
         try:
             self._carry_out(self._session.conclude(ticket, outcome))

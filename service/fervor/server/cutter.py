@@ -1,4 +1,4 @@
-"""Cuts what a client sends into WebSocket frames (RFC 6455, section 5.2), without I/O.
+"""WebSocket frames (RFC 6455, section 5.2), without I/O: cuts what a client sends into them, makes those of a server.
 
 Nearly everything a client says is one whole, masked data frame: such a message is unmasked here. All else (control
 frames, messages in pieces, frames of which a part is still to come, whatever is wrong) is passed on as it came, a frame
@@ -8,6 +8,7 @@ at a time, for a complete parser to judge.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
+from struct import Struct
 
 from websockets.frames import Opcode
 
@@ -18,13 +19,62 @@ except ImportError:  # a build without C
 
 FIN = 0x80
 MASKED = 0x80
-_WHOLE = (FIN | Opcode.TEXT, FIN | Opcode.BINARY)
+_TEXT, _BINARY = int(FIN | Opcode.TEXT), int(FIN | Opcode.BINARY)
+_WHOLE = (_TEXT, _BINARY)
 _PIECES = (Opcode.CONT, FIN | Opcode.CONT, Opcode.TEXT, Opcode.BINARY)
 _CONTROL = (FIN | Opcode.CLOSE, FIN | Opcode.PING, FIN | Opcode.PONG)
 
 MASK_BYTES = 4
+START = 2 + MASK_BYTES
+"""Where the payload of a short frame starts."""
+
 SHORT = 126
 """Lengths below stand in the second byte; this one says that two bytes of length follow, the next one that eight do."""
+
+
+_MEDIUM, _LONG = Struct("!BBH"), Struct("!BBQ")
+
+
+def whole(data: bytes, most_bytes: int) -> str | bytes | None:
+    """The message where these bytes are one of usual size and nothing else, as they mostly are.
+
+    None where they are not, or are no text where they should be: then they are to be `cut`.
+
+    Args:
+        data: from the start of a frame on, outside a message in pieces.
+        most_bytes: largest message.
+    """
+    length = len(data)
+    if length < START:
+        return None
+    if data[1] == MASKED | SHORT:
+        size, start = data[2] << 8 | data[3], START + 2
+    else:
+        size, start = data[1] - MASKED, START
+        if not 0 <= size < SHORT:  # without a mask it is negative
+            return None
+    if start + size != length or size > most_bytes:
+        return None
+    first = data[0]
+    if first == _BINARY:
+        return apply_mask(data[start:], data[start - MASK_BYTES : start])
+    if first != _TEXT:
+        return None
+    try:
+        return apply_mask(data[start:], data[start - MASK_BYTES : start]).decode()
+    except UnicodeDecodeError:
+        return None
+
+
+def as_frame(message: str | bytes) -> bytes:
+    """A message as a frame of a server: in one, without a mask."""
+    first, payload = (_TEXT, message.encode()) if isinstance(message, str) else (_BINARY, message)
+    size = len(payload)
+    if size < SHORT:
+        return bytes((first, size)) + payload
+    if size < 65536:
+        return _MEDIUM.pack(first, SHORT, size) + payload
+    return _LONG.pack(first, SHORT + 1, size) + payload
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,21 +99,10 @@ class Cutter:
         self._owed = 0.0  # bytes of the frame being passed on that are still to come
         self._in_pieces = False  # between the first and the last piece of a message
 
-    def whole(self, data: bytes) -> bytes | None:
-        """The payload where these bytes are one binary message of usual size and nothing else, as they mostly are.
-
-        None, having done nothing, where they are not: then they are to be `cut`.
-        """
-        if len(data) < 2 or data[0] != _WHOLE[1] or self._kept or self._owed or self._in_pieces:
-            return None
-        size, start = data[1] - MASKED, 2 + MASK_BYTES  # of a frame without a mask: negative
-        if not 0 <= size <= SHORT:
-            return None
-        if size == SHORT:
-            size, start = int.from_bytes(data[2:4], "big"), 4 + MASK_BYTES
-        if start + size != len(data) or size > self._most:
-            return None
-        return apply_mask(data[start:], data[start - MASK_BYTES : start])
+    @property
+    def at_rest(self) -> bool:
+        """Whether the next byte begins a frame, and not inside a message."""
+        return not (self._kept or self._owed or self._in_pieces)
 
     def cut(self, data: bytes) -> Iterator[Message | bytes]:
         """Messages and, as bytes, everything that is not one; what is passed on never spans two frames that are valid.
@@ -83,7 +122,7 @@ class Cutter:
                 if size <= self._most and start + size <= end and self._is_message(data[at]):
                     stop = start + int(size)
                     payload = apply_mask(data[start:stop], data[start - MASK_BYTES : start])
-                    yield Message(payload, is_text=data[at] == _WHOLE[0])
+                    yield Message(payload, is_text=data[at] == _TEXT)
                     at = stop
                     continue
                 self._note(data[at])

@@ -15,6 +15,8 @@ from fervor.session.session import Session
 class Leaving(Protocol):
     """A conversation that can be told to end, and asked what it came to."""
 
+    __slots__ = ()
+
     @property
     def totals(self) -> Totals:
         """So far."""
@@ -26,6 +28,9 @@ class Leaving(Protocol):
     @property
     def session(self) -> Session:
         """What it is about, for who watches."""
+
+    def look(self, now: float) -> None:
+        """See whether a timeout is over; `now` is the event loop's time, seconds."""
 
     def go_away(self, seconds: float) -> None:
         """Say so, send the last checkpoints, and close once they are out."""

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from fastapi import FastAPI
 
 from fervor.server.service import Service
+from fervor.server.timeouts import watch_timeouts
 
 log = logging.getLogger(__name__)
 
@@ -30,6 +31,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     watches = [
         asyncio.create_task(service.metrics.watch_loop()),
         asyncio.create_task(service.shedding.run(service.drain)),
+        asyncio.create_task(watch_timeouts(service.drain)),
     ]
     try:
         yield

@@ -6,6 +6,8 @@ from fervor.errors import RateExceeded
 class Pace:
     """The allowance of one session."""
 
+    __slots__ = ("_left", "_most", "_rate", "_then")
+
     def __init__(self, frames_per_second: float, burst: int) -> None:
         """Start with a full allowance: a second's frames, or one whole message (`burst`) where that is more."""
         self._rate = frames_per_second

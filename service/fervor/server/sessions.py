@@ -1,8 +1,5 @@
 """Admission: who may open one more session, decided before the upgrade."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from fervor.engine.slots import Slots
 from fervor.errors import Overloaded
 from fervor.server.draining import Drain
@@ -25,9 +22,8 @@ class Sessions:
         self._shedding = shedding
         self._metrics = metrics
 
-    @contextmanager
-    def admitted(self) -> Iterator[None]:
-        """Room for one more session, while it lasts.
+    def admit(self) -> None:
+        """Make room for one more session; `leave` frees it.
 
         Raises:
             Overloaded: the service stops, is late with its frames, has as many sessions as it takes, or no body left to
@@ -39,10 +35,10 @@ class Sessions:
             self._metrics.note_refusal(reason)
             raise Overloaded(sentence, retry_after=COME_BACK_S)
         self.open += 1
-        try:
-            yield
-        finally:
-            self.open -= 1
+
+    def leave(self) -> None:
+        """A session is over that was admitted."""
+        self.open -= 1
 
     def _refusal(self) -> tuple[str, str] | None:
         """Why not, for programs and for people."""

@@ -12,11 +12,12 @@ from starlette.responses import Response
 
 from fervor.errors import ProtocolError
 from fervor.protocol.codec import CODECS, Codec, JsonCodec
+from fervor.server.asgi_wire import AsgiWire
 from fervor.server.auth import TOKEN_SUBPROTOCOL
 from fervor.server.conversation import Conversation
 from fervor.server.problems import problem, problem_responses
 from fervor.server.service import Service, service_of
-from fervor.server.wire import wire_to
+from fervor.server.wire import EXTENSION, Shortcut, Wire
 
 router = APIRouter(prefix="/v1", tags=["stream"])
 
@@ -27,9 +28,18 @@ PATH = "/v1/stream"
 async def stream(websocket: WebSocket, service: Annotated[Service, Depends(service_of)]) -> None:
     """Follow bodies live."""
     codec, agreed = choose_codec(websocket.scope["subprotocols"])
-    with service.sessions.admitted(), suppress(WebSocketDisconnect):
-        await websocket.accept(agreed)
-        await Conversation(wire_to(websocket), service, codec, client=websocket.state.client).run()
+    service.sessions.admit()
+    conversation: Conversation | None = None
+    try:
+        wire = wire_to(websocket)
+        with suppress(WebSocketDisconnect):
+            await websocket.accept(agreed)
+            conversation = Conversation(wire, service, codec, client=websocket.state.client)
+    finally:
+        if conversation is None:
+            service.sessions.leave()
+    if conversation is not None:
+        await conversation.run()
 
 
 @router.get("/stream", status_code=426, response_class=Response, responses=problem_responses(401, 403, 426))
@@ -56,3 +66,9 @@ def choose_codec(offered: Sequence[str]) -> tuple[Codec, str | None]:
             return CODECS[name], name
     shown = ", ".join(names)[:100]
     raise ProtocolError(f"subprotocol {shown} is not known; expected {' or '.join(CODECS)}")
+
+
+def wire_to(websocket: WebSocket) -> Wire:
+    """The best wire that the server of a WebSocket offers; to be asked for before it is accepted."""
+    shortcut: Shortcut | None = websocket.scope.get("extensions", {}).get(EXTENSION)
+    return AsgiWire(websocket) if shortcut is None else shortcut.offer()

@@ -23,6 +23,8 @@ log = logging.getLogger(__name__)
 class Taker(Protocol):
     """A conversation, seen from a turn."""
 
+    __slots__ = ()
+
     @property
     def agreement(self) -> Agreement | None:
         """What its session agreed on; None before the start."""

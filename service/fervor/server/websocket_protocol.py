@@ -1,39 +1,30 @@
 """uvicorn's WebSocket protocol, with what it leaves out.
 
-With transport `direct` it offers a shortcut past ASGI (`fervor.server.wire`): messages that come whole are handed to
-the conversation in the turn in which they came, and answers are written as they are given.
+With transport `direct` it makes the handshake only: what accepts it may take the connection over (`DirectWire`), and
+this object, with all that ASGI needs, is gone.
 
-Frames that are no messages (pings, pongs, pieces of a message) have a pace, too. Pings of a client that reads nothing
-are not answered, so that pongs can't pile up. A connection whose conversation is over is cut if its client does not
-take what is left. Nothing of a request's headers is logged.
+Otherwise: frames that are no messages (pings, pongs, pieces of a message) have a pace, too. Pings of a client that
+reads nothing are not answered, so that pongs can't pile up. A connection whose conversation is over is cut if its
+client does not take what is left. Nothing of a request's headers is logged.
 """
 
-import struct
+import asyncio
 from asyncio import TimerHandle
 from http import HTTPStatus
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.datastructures import Headers
-from websockets.frames import Frame, Opcode
+from websockets.frames import Frame
 from websockets.http11 import Request, Response
-from websockets.protocol import CONNECTING, OPEN
 
 from fervor.errors import RateExceeded
-from fervor.server.cutter import FIN, SHORT, Cutter, Message
+from fervor.server.direct_wire import LEFT_BEHIND_S, DirectWire
 from fervor.server.pace import Pace
+from fervor.server.parser import PIECE
 from fervor.server.problems import CODES, problem
 from fervor.server.service import Service
-from fervor.server.wire import EXTENSION, Take
-
-PIECE = 4096
-"""Bytes that are read in one go; so many small frames at most come between two looks at the pace."""
-
-LEFT_BEHIND_S = 5.0
-"""Seconds that a client has to take what is left, once the conversation is over."""
-
-
-_MEDIUM, _LONG = struct.Struct("!BBH"), struct.Struct("!BBQ")
+from fervor.server.wire import EXTENSION
 
 
 class GuardedWebSocket(WebSocketsSansIOProtocol):
@@ -43,13 +34,10 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         super().__init__(*arguments, **options)
         service = self.config.app.state.service  # type: ignore[union-attr]  # create_app put it there
         assert isinstance(service, Service)
-        self._neighbours = service.connections
+        self._service = service
         rate = service.settings.max_frames_per_second
         self._pace = Pace(rate, service.settings.max_frames_per_message)
-        self._direct = service.settings.transport == "direct"
-        self._cutter: Cutter | None = None
-        self.take: Take | None = None
-        """See `Shortcut`."""
+        self._heir: DirectWire | None = None
         self._cut: TimerHandle | None = None
         self.conn.debug = False  # it would log headers, tokens among them
         self.conn.reject = _reject  # type: ignore[method-assign]  # its own refusals are plain text
@@ -58,74 +46,50 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         """The connection is gone."""
         if self._cut is not None:
             self._cut.cancel()
-        self._neighbours.leave(self.transport)
-        self.take = None
+        self._service.connections.leave(self.transport)
         super().connection_lost(exc)
 
+    # The handshake.
+
     def handle_connect(self, event: Request) -> None:
-        """A handshake: the application decides on it."""
+        """A handshake: the application decides on it; until then nothing more is read."""
         super().handle_connect(event)
-        if self._direct and not self.handshake_complete:
-            self._cutter = Cutter(most_bytes=self.config.ws_max_size)
+        if not self.handshake_complete and self._service.settings.transport == "direct":
+            self.transport.pause_reading()
             extensions: dict[str, Any] = self.scope["extensions"]
             extensions[EXTENSION] = self  # the task that reads it runs later
 
+    def offer(self) -> DirectWire:
+        """See `Shortcut`."""
+        self._heir = DirectWire(self.config, self.connections, self._service)
+        return self._heir
+
+    async def send(self, message: Any) -> None:
+        """Say what the application says; with its accept, go on by one way or the other."""
+        await super().send(message)
+        if message["type"] == "websocket.accept" and not self.transport.is_closing():
+            if self._heir is not None:
+                self._hand_over(self._heir)
+            elif EXTENSION in self.scope["extensions"]:
+                self.transport.resume_reading()
+
+    def _hand_over(self, heir: DirectWire) -> None:
+        """The connection goes to another protocol; what is left here is not to touch it, nor to be held by it."""
+        self.stop_keepalive()
+        self.connections.discard(self)
+        heir.take_over(self.transport)
+        self.transport = _HandedOver()
+        self.disconnected = True
+        del self.scope["extensions"][EXTENSION]
+
+    # The way of ASGI.
+
     def data_received(self, data: bytes) -> None:
         """Bytes of frames."""
-        if self._cutter is None:
-            self._parse(data)
-            return
-        if self._can_take and (message := self._cutter.whole(data)) is not None:
-            if self.take is None or not self.take(message):
-                self._hand_over(Message(message, is_text=False))
-            return
-        for part in self._cutter.cut(data):
-            if isinstance(part, bytes):
-                self._parse(part)
-            elif self.conn.state in (CONNECTING, OPEN) and not self.transport.is_closing():
-                self._hand_over(part)
-
-    @property
-    def _can_take(self) -> bool:
-        """Whether a message would go to the conversation, and none waits before it."""
-        if self.take is None or self.close_sent or self.conn.state is not OPEN:
-            return False
-        return self.queue.empty() and not self.transport.is_closing()
-
-    def _parse(self, data: bytes) -> None:
-        """Let the complete parser have these bytes."""
         for start in range(0, len(data), PIECE):
             if self.transport.is_closing():
                 return
             super().data_received(data[start : start + PIECE])
-
-    def _hand_over(self, message: Message) -> None:
-        self.curr_msg_data_type = "text" if message.is_text else "bytes"
-        self.frames = [message.payload]
-        self.send_receive_event_to_app()
-
-    def send_receive_event_to_app(self) -> None:
-        """A message is there."""
-        if self.take is None or self.close_sent or not self.queue.empty():
-            super().send_receive_event_to_app()
-            return
-        data = b"".join(self.frames)
-        try:
-            message = data.decode() if self.curr_msg_data_type == "text" else data
-        except UnicodeDecodeError:
-            super().send_receive_event_to_app()  # which says so
-            return
-        if self.take(message):
-            self.frames = []
-        else:
-            super().send_receive_event_to_app()
-
-    def write(self, message: str | bytes) -> bool:
-        """See `Shortcut`."""
-        if self.conn.state is not OPEN or not self.writable.is_set() or self.transport.is_closing():
-            return False
-        self.transport.write(_as_frame(message))
-        return True
 
     def handle_ping(self) -> None:
         """Answer, if the client reads; RFC 6455 asks for an answer to the newest ping only."""
@@ -150,7 +114,8 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
         try:
             await super().run_asgi()
         finally:
-            self._cut = self.loop.call_later(LEFT_BEHIND_S, self.transport.abort)
+            if not isinstance(self.transport, _HandedOver):
+                self._cut = self.loop.call_later(LEFT_BEHIND_S, self.transport.abort)
 
     def _count(self) -> None:
         try:
@@ -163,15 +128,14 @@ class GuardedWebSocket(WebSocketsSansIOProtocol):
             self.handle_parser_exception()
 
 
-def _as_frame(message: str | bytes) -> bytes:
-    """A message as a frame of a server: in one, without a mask."""
-    opcode, payload = (Opcode.TEXT, message.encode()) if isinstance(message, str) else (Opcode.BINARY, message)
-    size = len(payload)
-    if size < SHORT:
-        return bytes((FIN | opcode, size)) + payload
-    if size < 65536:
-        return _MEDIUM.pack(FIN | opcode, SHORT, size) + payload
-    return _LONG.pack(FIN | opcode, SHORT + 1, size) + payload
+class _HandedOver(asyncio.Transport):
+    """In place of a transport that another protocol has now: nothing to write to, nothing to close."""
+
+    def is_closing(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        pass
 
 
 def _reject(status: int, text: str) -> Response:
