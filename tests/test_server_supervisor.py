@@ -1,7 +1,10 @@
 """Several workers on one address: killed, stuck, replaced, drained; no stream notices."""
 
+import asyncio
 import os
 import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import httpx
@@ -15,7 +18,32 @@ from fervor.settings import Settings
 from live import PROTOCOL, Live
 from program import fervor
 from waiting import until
-from workers import is_alive, served
+from workers import Served, is_alive, served
+
+A_FEW = 4
+"""Sessions that a worker may have more than another: they come and are told of from many sides at once."""
+
+
+@asynccontextmanager
+async def crowded(service: Served, sessions: int) -> AsyncIterator[None]:
+    """So many sessions, opened all at once."""
+
+    async def connect() -> websockets.ClientConnection:
+        return await websockets.connect(
+            service.stream, subprotocols=[PROTOCOL], compression=None, open_timeout=60, close_timeout=1
+        )
+
+    sockets = await asyncio.gather(*(connect() for _ in range(sessions)))
+    try:
+        yield
+    finally:
+        await asyncio.gather(*(socket.close() for socket in sockets))
+
+
+def opened(service: Served, sessions: int) -> list[float]:
+    """What each worker has, if they have so many together."""
+    counts = list(service.sessions().values())
+    return counts if sum(counts) == sessions else []
 
 
 def test_both_workers_serve_and_each_metric_tells_of_both(tmp_path: Path) -> None:
@@ -23,8 +51,36 @@ def test_both_workers_serve_and_each_metric_tells_of_both(tmp_path: Path) -> Non
         assert len(service.workers()) == 2
         with Robots(service.stream, 8):
             until(lambda: sum(service.sessions().values()) == 8)
-            assert len(service.sessions()) == 2
-            assert all(service.sessions().values()), "eight robots all came to one of two workers"
+            assert list(service.sessions().values()) == [4, 4]
+
+
+@pytest.mark.parametrize("workers", [2, 4])
+async def test_sessions_that_come_at_once_fall_to_all_workers_alike(tmp_path: Path, workers: int) -> None:
+    with served(tmp_path, workers=workers) as service:
+        async with crowded(service, 200):
+            counts = await asyncio.to_thread(until, lambda: opened(service, 200))
+    assert len(counts) == workers
+    assert max(counts) - min(counts) <= A_FEW
+
+
+async def test_a_new_worker_takes_what_comes_until_it_has_as_many(tmp_path: Path) -> None:
+    with served(tmp_path) as service:
+        async with crowded(service, 60):
+            os.kill(service.workers().pop(), signal.SIGKILL)
+            await asyncio.to_thread(until, lambda: len(service.sessions()) == 2 and opened(service, 30))
+            async with crowded(service, 30):
+                counts = await asyncio.to_thread(until, lambda: opened(service, 60))
+    assert max(counts) - min(counts) <= A_FEW
+
+
+async def test_workers_that_are_stuck_cost_who_comes_a_moment(tmp_path: Path) -> None:
+    with served(tmp_path, workers=3) as service:
+        first, second, _ = service.workers()
+        async with crowded(service, 6):
+            for number in (first, second):
+                os.kill(number, signal.SIGSTOP)
+            async with crowded(service, 10):  # long before the two are killed
+                assert {first, second} <= service.workers()
 
 
 def test_a_killed_worker_costs_no_robot_a_frame(tmp_path: Path, live: Live) -> None:

@@ -1,4 +1,4 @@
-"""The `fervor` program with two workers, seen from outside."""
+"""The `fervor` program with two workers or more, seen from outside."""
 
 import subprocess
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from waiting import until
 
 
 class Served:
-    """The program with two workers."""
+    """The program with its workers."""
 
     def __init__(self, process: "subprocess.Popen[bytes]", log: Path) -> None:
         self.process = process
@@ -46,10 +46,10 @@ class Served:
 
 
 @contextmanager
-def served(folder: Path, *options: str) -> Iterator[Served]:
+def served(folder: Path, *options: str, workers: int = 2) -> Iterator[Served]:
     """The program, serving; its log goes into `folder`."""
     log = folder / "log"
-    command = [FERVOR, "serve", "--port", "0", "--workers", "2", *options]
+    command = [FERVOR, "serve", "--port", "0", "--workers", str(workers), *options]
     with log.open("wb") as said, subprocess.Popen(command, stderr=said) as process:
         try:
             yield Served(process, log)

@@ -10,6 +10,8 @@ import struct
 import zlib
 from time import monotonic
 
+from fervor.server.shares import Shares
+
 HALF_BYTES = 1 << 20
 """Most that a worker can show; pages that were never written take no memory."""
 
@@ -24,6 +26,7 @@ class Board:
 
     def __init__(self, places: int) -> None:
         self.places = places
+        self.shares = Shares(places)
         self._memory = mmap.mmap(-1, 1 + places * _PLACE_BYTES)
 
     @property
@@ -67,6 +70,7 @@ class Board:
     def clear(self, place: int) -> None:
         """Nobody stands at a place any more."""
         self._memory[self._start(place)] = _NOTHING
+        self.shares.withdraw(place)
 
     def _start(self, place: int) -> int:
         """Where the byte is that says which half is shown; the stamp stands before it."""

@@ -5,6 +5,7 @@ longer ready, streams get their last checkpoints and 1012, and what else is unde
 With more than one worker, a supervisor runs that many such processes on the same address.
 """
 
+import asyncio
 import gc
 import logging
 import resource
@@ -22,6 +23,7 @@ from fervor.errors import FervorError
 from fervor.server.app import create_app
 from fervor.server.board import Board
 from fervor.server.http_protocol import GuardedHttp
+from fervor.server.listener import Listener
 from fervor.server.logs import configure_logs
 from fervor.server.service import Service
 from fervor.server.websocket_protocol import GuardedWebSocket
@@ -56,6 +58,7 @@ class Server(uvicorn.Server):
         config: from `configure`.
         on_listening: told each socket once connections to it are taken.
         board: where other workers listen on the same sockets.
+        place: of this worker on the board.
         told: set once this process was told to stop, from `end_well`.
     """
 
@@ -65,21 +68,45 @@ class Server(uvicorn.Server):
         *,
         on_listening: Callable[[socket.socket], None] = say_where,
         board: Board | None = None,
+        place: int = 0,
         told: threading.Event | None = None,
     ) -> None:
         super().__init__(config)
         self._told = told
         self._on_listening = on_listening
         self._board = board
+        self._place = place
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen."""
-        await super().startup(sockets)
+        await super().startup(sockets if self._board is None else [])
         if self._told is not None and self._told.is_set():
             self.should_exit = True
             return
         for bound in sockets or []:
+            if self._board is not None:
+                self.servers.append(self._share(bound, self._board))  # type: ignore[arg-type]  # all that is used of one
             self._on_listening(bound)
+
+    def _share(self, bound: socket.socket, board: Board) -> Listener:
+        """Listen on a socket beside other workers."""
+        loop = asyncio.get_running_loop()
+
+        def make_protocol() -> asyncio.Protocol:
+            return GuardedHttp(
+                config=self.config, server_state=self.server_state, app_state=self.lifespan.state, _loop=loop
+            )
+
+        service: Service = self.config.app.state.service  # type: ignore[union-attr]  # create_app put it there
+        return Listener(
+            bound,
+            self.config.backlog,
+            make_protocol,
+            connections=service.connections,
+            is_full=lambda: service.sessions.full,
+            shares=board.shares,
+            place=self._place,
+        )
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Send the streams away with their last checkpoints, then stop.

@@ -22,6 +22,11 @@ class Sessions:
         self._shedding = shedding
         self._metrics = metrics
 
+    @property
+    def full(self) -> bool:
+        """Whether one more would be refused."""
+        return self._refusal() is not None
+
     def admit(self) -> None:
         """Make room for one more session; `leave` frees it.
 

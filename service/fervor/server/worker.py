@@ -1,9 +1,9 @@
 """One of several processes that serve one address. The supervisor forks it; what it does there is `Worker.work`.
 
-Rules. It takes connections from the listening socket that all share: whichever worker is free takes the next one. It
-leaves as a service does that runs alone, with last checkpoints and 1012, and while the others stay it stops taking
-connections first. It does not outlive the supervisor. Ctrl-C and SIGHUP, which a terminal sends to all of its
-processes, are the supervisor's to hear.
+Rules. It takes connections from the listening socket that all share, unless it has more than another. It leaves as a
+service does that runs alone, with last checkpoints and 1012, and while the others stay it stops taking connections
+first. It does not outlive the supervisor. Ctrl-C and SIGHUP, which a terminal sends to all of its processes, are the
+supervisor's to hear.
 """
 
 import gc
@@ -43,8 +43,13 @@ class Worker:
             config = configure(self.settings)
             config.app.state.service.metrics.gather(self.board, self.place)  # type: ignore[union-attr]
             gc.freeze()  # as in `fervor.server.run`
-            server = Server(config, on_listening=lambda _: self.ready.send("serves"), board=self.board, told=told)
-            server.run(sockets=[self.bound])
+            Server(
+                config,
+                on_listening=lambda _: self.ready.send("serves"),
+                board=self.board,
+                place=self.place,
+                told=told,
+            ).run(sockets=[self.bound])
         except FervorError as error:
             sys.stderr.write(f"fervor: {error.message}\n")
             sys.exit(error.exit_code)
