@@ -2,7 +2,7 @@
 
 Workers share nothing but the listening socket. So how many sessions they carry follows from two figures that can be
 taken where one of them shares its processor with the load generator: what a frame costs, in processor time, and how
-evenly the sessions fall to them.
+evenly the sessions fall to them: all are carried in time for as long as the busiest worker is not full.
 """
 
 import os
@@ -14,6 +14,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from http.client import HTTPConnection
 from itertools import cycle
+from operator import sub
 from pathlib import Path
 
 from rich.table import Table
@@ -29,12 +30,15 @@ from fervor_bench.usage import children, family_cpu_seconds
 WORKERS = (1, 2)
 
 SESSIONS = 600
-"""About what a worker carries; fewer fall to the workers less evenly."""
+"""About what a worker carries."""
 
 ROUNDS = 3
 
 READY_S = 60.0
 """Longest wait for all workers."""
+
+SETTLE_S = 2.0
+"""Longest wait for the metrics of all workers, which are half a second old at most."""
 
 _BY_WORKER = re.compile(r"^fervor_sessions_total(?:\{[^}]*\})? (\S+)$", re.MULTILINE)
 
@@ -46,13 +50,18 @@ class Crew:
     workers: int
     frame_us: float
     """Processor time a frame, all processes, microseconds."""
-    sessions: tuple[int, ...]
-    """That fell to each worker."""
+    rounds: tuple[tuple[int, ...], ...]
+    """Sessions that fell to each worker, by round."""
 
     @property
     def evenness(self) -> float:
-        """Sessions of the mean worker, as a share of the busiest one's."""
-        return sum(self.sessions) / self.workers / max(self.sessions)
+        """Sessions of the mean worker, as a share of the busiest one's, in the least even round."""
+        return min(sum(sessions) / self.workers / max(sessions) for sessions in self.rounds)
+
+    @property
+    def lay(self) -> str:
+        """How the sessions of the least even round lay."""
+        return " + ".join(map(str, max(self.rounds, key=max)))
 
     def gain(self, alone: "Crew") -> float:
         """Sessions that they carry, as a multiple of what one worker carries: each on a processor of its own."""
@@ -62,13 +71,13 @@ class Crew:
 def worker_gains(seconds: float = 2.0) -> Table:
     """Measure, and show as a table."""
     table = Table(title="what workers carry, by what a frame costs them and how sessions fall to them")
-    for heading in ("workers", "µs a frame", "busiest worker has", "x sessions of one"):
+    for heading in ("workers", "µs a frame", "sessions lay, at worst", "evenness", "x sessions of one"):
         table.add_column(heading, justify="right")
     with tempfile.TemporaryDirectory(prefix="fervor-bench-") as folder:
         crews = measure_crews(Path(folder), seconds)
     for crew in crews:
-        busiest = max(crew.sessions) / sum(crew.sessions)
-        table.add_row(f"{crew.workers}", f"{crew.frame_us:.1f}", f"{busiest:.0%}", f"{crew.gain(crews[0]):.2f}")
+        gain = f"{crew.gain(crews[0]):.2f}"
+        table.add_row(f"{crew.workers}", f"{crew.frame_us:.1f}", crew.lay, f"{crew.evenness:.1%}", gain)
     return table
 
 
@@ -80,6 +89,7 @@ def measure_crews(folder: Path, seconds: float, *, sessions: int = SESSIONS, rou
     """
     places = choose_places()
     costs: dict[int, list[float]] = {workers: [] for workers in WORKERS}
+    lay: dict[int, list[tuple[int, ...]]] = {workers: [] for workers in WORKERS}
     with ExitStack() as stack:
         crews = {workers: stack.enter_context(started(_crew(workers), folder, places.server)) for workers in WORKERS}
         for workers, running in crews.items():
@@ -88,11 +98,14 @@ def measure_crews(folder: Path, seconds: float, *, sessions: int = SESSIONS, rou
         track = Track(folder, places, Traffic(), used=family_cpu_seconds)
         for _ in range(rounds):
             for workers, running in crews.items():
+                before = _sessions(running)
                 trial = track.run(running, Load(sessions, "closed", warmup_s=seconds / 4, seconds=seconds))
                 if trial.server_us is None:
                     raise BenchError(f"{workers} workers answered no frame")
                 costs[workers].append(trial.server_us)
-        return [Crew(workers, min(costs[workers]), tuple(_sessions(crews[workers]))) for workers in WORKERS]
+                after = _settled(running, sum(before) + sessions)
+                lay[workers].append(tuple(map(sub, after, before)))
+        return [Crew(workers, min(costs[workers]), tuple(lay[workers])) for workers in WORKERS]
 
 
 def _crew(workers: int) -> Contestant:
@@ -114,6 +127,14 @@ def _wait_for(running: Running, workers: int) -> None:
         if time.monotonic() > until:
             raise BenchError(f"{workers} workers were not ready after {READY_S:g} s")
         time.sleep(0.05)
+
+
+def _settled(running: Running, expected: int) -> list[int]:
+    """Sessions that began, by worker, once so many did; sooner where some were refused."""
+    until = time.monotonic() + SETTLE_S
+    while sum(found := _sessions(running)) < expected and time.monotonic() < until:
+        time.sleep(0.05)
+    return found
 
 
 def _sessions(running: Running) -> list[int]:
