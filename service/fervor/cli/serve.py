@@ -1,5 +1,6 @@
 """`fervor serve`: the service. Its options are the settings."""
 
+import gc
 import inspect
 from typing import Annotated, Any, get_args
 
@@ -15,9 +16,13 @@ def serve(**options: Any) -> None:
     set only there.
     """
     settings = Settings.load(**options)
-    from fervor.server.run import run
+    gc.disable()  # all that is loaded now stays: to walk it again and again is a tenth of the start
+    try:
+        from fervor.server.run import run
 
-    run(settings)
+        run(settings)
+    finally:
+        gc.enable()
 
 
 def _signature() -> inspect.Signature:

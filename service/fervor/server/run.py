@@ -134,12 +134,21 @@ def run(settings: Settings) -> None:
     with bind(settings.host, settings.port) as bound:
         if settings.workers == 1:
             server = Server(configure(settings), told=told)
-            gc.freeze()  # modules and the model stay to the end: the collector need not walk them beside live streams
+            leave_alone_what_is_loaded()
             server.run(sockets=[bound])
         else:
             from fervor.server.supervisor import Supervisor
 
             Supervisor(settings, bound, on_serving=say_where).run()
+
+
+def leave_alone_what_is_loaded() -> None:
+    """Have the collector look at what comes from now on, and at that only.
+
+    Modules and the model stay to the end: it need not walk them beside live streams, and workers go on sharing them.
+    """
+    gc.freeze()
+    gc.enable()  # `fervor serve` loads without it
 
 
 def end_well() -> threading.Event:

@@ -11,7 +11,6 @@ Rules.
 Why not uvicorn's supervisor: its workers outlive it when it is killed, share no memory, and know nothing of drains.
 """
 
-import gc
 import logging
 import multiprocessing
 import os
@@ -29,6 +28,7 @@ from time import monotonic
 from pydantic import SecretStr
 
 from fervor.server.board import Board
+from fervor.server.run import leave_alone_what_is_loaded
 from fervor.server.worker import Worker
 from fervor.settings import Settings
 
@@ -87,7 +87,7 @@ class Supervisor:
             KeyboardInterrupt: stopped by Ctrl-C.
             SystemExit: the first worker could not start.
         """
-        gc.freeze()  # what is here now is left alone, so that workers go on sharing it
+        leave_alone_what_is_loaded()
         with heard_signals() as heard:
             self._fill_up()
             while self._members or self._stopped_by is None:

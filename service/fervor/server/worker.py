@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 
 from fervor.errors import FervorError
 from fervor.server.board import Board
-from fervor.server.run import Server, configure, end_well
+from fervor.server.run import Server, configure, end_well, leave_alone_what_is_loaded
 from fervor.settings import Settings
 
 
@@ -39,10 +39,11 @@ class Worker:
         told = end_well()
         signal.pthread_sigmask(signal.SIG_SETMASK, {signal.SIGINT, signal.SIGHUP})
         threading.Thread(target=self._end_with_supervisor, daemon=True).start()
+        gc.disable()  # until all is loaded
         try:
             config = configure(self.settings)
             config.app.state.service.metrics.gather(self.board, self.place)  # type: ignore[union-attr]
-            gc.freeze()  # as in `fervor.server.run`
+            leave_alone_what_is_loaded()
             Server(
                 config,
                 on_listening=lambda _: self.ready.send("serves"),
