@@ -1,6 +1,7 @@
 """The model file at run time: what is loaded, what is refused, and that nothing prints."""
 
 import hashlib
+import inspect
 import os
 import re
 import subprocess
@@ -13,9 +14,11 @@ from onnx import TensorProto, helper, numpy_helper
 
 import fervor.model
 from fervor.emotions import EMOTIONS
+from fervor.engine import engine
 from fervor.errors import EngineError, ModelFileError
 from fervor.metadata import METADATA_KEY, StateTensor
 from fervor.model import Model, check_row_independence, default_model_path
+from fervor.scoring import sequences
 from fervor.skeletons.rig import JOINTS, PARENTS
 from fervor_export.graph import build_model
 from networks import DEFAULT, frames, metadata, model_bytes, network
@@ -288,6 +291,37 @@ def test_states_that_differ_are_seen_too(model):
 
     with pytest.raises(EngineError):
         check_row_independence(Drifting(model, safe=None))
+
+
+class Odd:
+    """A model one of whose rows differs, in calls of one shape only."""
+
+    def __init__(self, model: Model, size: int, row: int, time: int) -> None:
+        self.model, self.shape, self.row = model, (size, time), row
+        self.metadata, self.zero_states = model.metadata, model.zero_states
+
+    def run(self, rotations, mask, emotion, states):
+        outputs = self.model.run(rotations, mask, emotion, states)
+        if rotations.shape[:2] == self.shape:
+            outputs.states["h2"][self.row, 7] += np.float32(1e-6)
+        return outputs
+
+
+@pytest.mark.parametrize(("size", "row", "time"), [(5, 0, 1), (33, -1, 1), (33, -1, 3), (33, 11, 5)])
+def test_one_row_that_differs_is_seen(model, size, row, time):
+    assert check_row_independence(Odd(model, size, row, time)) == 2, "the sizes that are left are even"
+
+
+@pytest.mark.parametrize(("size", "row", "time"), [(48, -12, 2), (256, -12, 1), (256, 0, 1)])
+def test_one_row_that_differs_in_a_multiple_of_all_is_seen(model, size, row, time):
+    with pytest.raises(EngineError):
+        check_row_independence(Odd(model, size, row, time))
+
+
+def test_the_proof_covers_the_batches_that_are_run():
+    covered = {name: of.default for name, of in inspect.signature(check_row_independence).parameters.items()}
+    assert covered["largest"] == engine.MOST_ROWS
+    assert covered["together"] >= sequences.MOST_ROWS
 
 
 def test_onnx_itself_finds_nothing_wrong():

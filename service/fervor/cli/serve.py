@@ -1,11 +1,11 @@
 """`fervor serve`: the service. Its options are the settings."""
 
-import gc
 import inspect
 from typing import Annotated, Any, get_args
 
 import typer
 
+from fervor.cli.loading import built_when_used, uncollected
 from fervor.settings import Settings, is_option, option_name
 
 
@@ -16,13 +16,11 @@ def serve(**options: Any) -> None:
     set only there.
     """
     settings = Settings.load(**options)
-    gc.disable()  # all that is loaded now stays: to walk it again and again is a tenth of the start
-    try:
-        from fervor.server.run import run
+    with uncollected():  # until all is loaded: see `leave_alone_what_is_loaded`
+        with built_when_used():
+            from fervor.server.run import run
 
         run(settings)
-    finally:
-        gc.enable()
 
 
 def _signature() -> inspect.Signature:

@@ -5,7 +5,6 @@ from typing import Any
 from fastapi import APIRouter
 
 from fervor import __version__
-from fervor.protocol.asyncapi import asyncapi
 
 router = APIRouter(prefix="/v1", tags=["stream"])
 
@@ -13,4 +12,6 @@ router = APIRouter(prefix="/v1", tags=["stream"])
 @router.get("/asyncapi.json")
 async def stream_description() -> dict[str, Any]:
     """The AsyncAPI 3 document of `/v1/stream`."""
+    from fervor.protocol.asyncapi import asyncapi  # few ask, and no start should wait for it
+
     return asyncapi(__version__)
