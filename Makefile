@@ -8,7 +8,7 @@ PIP    := $(BIN)/python -m pip --disable-pip-version-check install --quiet --con
 # Slow proofs run in CI; `make test MARKS=` runs them here.
 MARKS  ?= $(if $(CI),,-m "not slow")
 
-.PHONY: help run page test lint types js audit bench soak clean
+.PHONY: help run page test lint types js audit bench soak image clean
 .DEFAULT_GOAL := help
 
 help: ## what there is to say
@@ -63,6 +63,13 @@ SECONDS ?= 600
 
 soak: $(VENV)/dev.stamp ## a service under churn for SECONDS=600: fails if it grows
 	@$(BIN)/python -m bench.soak --seconds $(SECONDS)
+
+# Which command line of Docker's to use.
+export DOCKER ?= docker
+
+image: ## build the container image; what it weighs, and how soon it serves
+	@$(DOCKER) build --tag fervor .
+	@$(PYTHON) -m bench.image fervor
 
 clean: ## forget the environment and everything made
 	rm -rf $(VENV) .venv-face .venv-ros build dist $(JS)/build $(JS)/dist $(JS)/node_modules page/node_modules $(dir $(PAGE))

@@ -82,7 +82,7 @@ class Docker:
         daemon = which("dockerd")
         assert daemon is not None
         beside = Path(daemon).parents[1] / "bin" / "docker"  # the client that came with the daemon
-        self._program = str(beside) if beside.exists() else str(which("docker"))
+        self.program = str(beside) if beside.exists() else str(which("docker"))
         plugins = home / "config" / "cli-plugins"
         plugins.mkdir(parents=True)
         (plugins / "docker-compose").symlink_to(str(which("docker-compose")))
@@ -97,7 +97,7 @@ class Docker:
         self, *arguments: object, stdin: str = "", check: bool = True, together: bool = False, **more: str
     ) -> str:
         """Run a command, with `more` in its environment; what it printed, its errors too where `together`."""
-        command = [self._program, *map(str, arguments)]
+        command = [self.program, *map(str, arguments)]
         environment = {**self.environment, **more}
         done = subprocess.run(
             command, input=stdin, capture_output=True, text=True, check=False, timeout=300, env=environment

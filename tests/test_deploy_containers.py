@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -90,6 +91,22 @@ def test_the_image_is_small_and_without_torch(docker: Docker) -> None:
     search = "from importlib.util import find_spec as f; print([m for m in ('torch', 'onnx', 'pip', 'pytest') if f(m)])"
     path = "/opt/fervor/bin/python"
     assert docker("run", "--rm", "--entrypoint", path, "fervor", "-I", "-c", search) == "[]"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_weight_and_the_cold_start_are_reported(docker: Docker) -> None:
+    before = docker("ps", "--all", "--quiet")
+    done = subprocess.run(
+        [sys.executable, "-m", "bench.image", "fervor", "--runs", "2"], cwd=ROOT, check=True, capture_output=True,
+        text=True, env={**docker.environment, "DOCKER": docker.program},
+    )  # fmt: skip
+    whole, over_base = map(int, re.findall(r"(\d+) MB", done.stdout))
+    added = (docker.inspect("fervor")["Size"] - docker.inspect(PYTHON_IMAGE)["Size"]) / 1e6
+    assert whole == round(docker.inspect("fervor")["Size"] / 1e6)
+    assert over_base == pytest.approx(added, abs=2)
+    assert "docker run to ready, 2 times, seconds: median " in done.stdout
+    assert docker("ps", "--all", "--quiet") == before
 
 
 @pytest.mark.slow
