@@ -41,6 +41,25 @@ def test_the_service_is_loaded_without_what_only_some_need() -> None:
     assert not loaded & set(FOR_LATER)
 
 
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts threads as Linux shows them")
+def test_numpy_brings_the_service_no_threads() -> None:
+    program = "import os, fervor.cli.serve, numpy; print(len(os.listdir('/proc/self/task')))"
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert ran.stdout.strip() == "1"
+
+
+def test_a_command_runs_with_the_collector_and_the_service_starts_without() -> None:
+    program = (
+        "import gc, fervor.cli.main, fervor.server.run, sys;"
+        "said = lambda *_, **__: print(gc.isenabled(), gc.get_freeze_count() > 10_000);"
+        "fervor.server.run.configure, fervor.server.run.Server.run = said, said;"
+        "sys.argv = ['fervor', 'serve', '--port', '0']; fervor.server.run.Server.__init__ = lambda *_, **__: None;"
+        "fervor.cli.main.main()"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert ran.stdout.split("\n")[:2] == ["False True", "True True"]
+
+
 def test_models_built_when_used_describe_the_same_service(tmp_path: Path) -> None:
     with served(tmp_path) as service:
         answer = httpx.get(f"{service.url}/openapi.json", timeout=60)

@@ -2,7 +2,8 @@
 
 import sys
 
-from fervor.cli.main import run
+from fervor.cli.main import main
 
 if __name__ == "__main__":
-    sys.exit(run(["serve", *sys.argv[1:]]))
+    sys.argv.insert(1, "serve")
+    main()

@@ -5,6 +5,7 @@ floors and other distributions bring theirs under the entry point group `GROUP`.
 imported, all of them only for the help. One whose extra is not installed stays in the help and says what it needs.
 """
 
+import gc
 from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated
@@ -116,8 +117,11 @@ def _show_version(wanted: bool) -> None:
 
 
 def _fervor(
-    version: Annotated[
+    version: Annotated[  # noqa: ARG001  # its callback acts on it
         bool, typer.Option("--version", help="Show the version.", callback=_show_version, is_eager=True)
     ] = False,
 ) -> None:
     """Live emotional intensity from body poses, for robots."""
+    if not gc.isenabled():  # `main` loads without it
+        gc.freeze()
+        gc.enable()

@@ -4,8 +4,6 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pydantic import BaseModel
-
 
 @contextmanager
 def uncollected() -> Iterator[None]:
@@ -23,6 +21,8 @@ def built_when_used() -> Iterator[None]:
 
     FastAPI brings forty that describe OpenAPI, of which a service needs none before somebody asks for `/openapi.json`.
     """
+    from pydantic import BaseModel
+
     config = BaseModel.model_config  # models inherit it when they are made, and keep what they inherited
     config["defer_build"] = True
     try:

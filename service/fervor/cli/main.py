@@ -3,6 +3,7 @@
 Stack traces are for faults of ours only. A closed pipe ends a program quietly, Ctrl-C with 130.
 """
 
+import gc
 import os
 import sys
 
@@ -18,6 +19,7 @@ UNAVAILABLE = 69
 
 def main() -> None:
     """The console entry point."""
+    gc.disable()  # until the command is loaded, which leaves next to no garbage
     sys.exit(run(sys.argv[1:]))
 
 

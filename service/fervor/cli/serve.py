@@ -1,9 +1,13 @@
 """`fervor serve`: the service. Its options are the settings."""
 
 import inspect
+import os
 from typing import Annotated, Any, get_args
 
 import typer
+
+# The service has one thread a process; OpenBLAS, which comes with numpy, starts one a core when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fervor.cli.loading import built_when_used, uncollected
 from fervor.settings import Settings, is_option, option_name
