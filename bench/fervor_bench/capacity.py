@@ -27,18 +27,39 @@ class Verdict:
     """A trial that fails proves nothing where the generator did."""
 
 
+Judge = Callable[[int], Verdict]
+"""Tries a number of sessions."""
+
+
 def find_capacity(
-    judge: Callable[[int], Verdict], *, first: int, most: int, resolution: float = 0.05, attempts: int = 2
+    judge: Judge,
+    *,
+    first: int,
+    most: int,
+    resolution: float = 0.05,
+    attempts: int = 2,
+    confirm: Judge | None = None,
 ) -> Capacity:
-    """Bracket the largest number that is kept, then halve the bracket.
+    """Bracket the largest number that is kept, halve the bracket, and have the answer confirmed.
 
     Args:
-        judge: tries a number of sessions.
+        judge: in a short trial.
         first: where to begin.
         most: no more than so many.
         resolution: of the answer, as a share of it.
         attempts: a number fails when so many trials in a row fail: neighbours on the machine cost some.
+        confirm: in a long trial; where it says no, it is asked for a number smaller by `resolution`, until it agrees.
     """
+    found = _search(judge, first=first, most=most, resolution=resolution, attempts=attempts)
+    while confirm is not None and found.sessions:
+        kept, sound = _try(confirm, found.sessions, attempts)
+        if kept:
+            break
+        found = Capacity(min(int(found.sessions * (1.0 - resolution)), found.sessions - 1), bounded=sound)
+    return found
+
+
+def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts: int) -> Capacity:
     low, high, valid, number = 0, most + 1, False, min(max(first, 1), most)
     while True:
         kept, sound = _try(judge, number, attempts)
@@ -51,7 +72,7 @@ def find_capacity(
         number = min(number * 2, most) if high > most else max((low + high) // 2, 1)
 
 
-def _try(judge: Callable[[int], Verdict], number: int, attempts: int) -> tuple[bool, bool]:
+def _try(judge: Judge, number: int, attempts: int) -> tuple[bool, bool]:
     """Whether a number is kept, and whether any failure was sound."""
     sound = False
     for _ in range(attempts):

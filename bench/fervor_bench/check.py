@@ -9,30 +9,31 @@ import numpy.typing as npt
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from fervor.emotions import EMOTIONS
-from fervor.model import Model, default_model_path
-from fervor.skeletons.rig import JOINTS
 from fervor_bench.contestant import Running
 from fervor_bench.errors import BenchError
+from fervor_bench.reference import expected_intensities
 from fervor_bench.traffic import Traffic
 
-FRAMES = 60
-"""2 s: before the service's second state is heard, which others don't have."""
+FRAMES = 300
+"""10 s: two states have spoken, and one has been restarted."""
 
 TOLERANCE = 1e-4
 
 
-def check_estimates(running: Running, traffic: Traffic) -> float:
+def check_estimates(running: Running, traffic: Traffic, *, grid: bool, states: int) -> float:
     """The largest difference between a contestant's intensities and the model's.
 
     Args:
         running: the contestant.
         traffic: of one body of the rig's 13 joints, a divisor of `FRAMES` frames a message.
+        grid: whether it puts poses on the model's grid by their times; else it makes every frame a step.
+        states: that it keeps of a body.
 
     Raises:
         BenchError: they differ by more than `TOLERANCE`, or there are none.
     """
-    difference = float(np.abs(_answered(running, traffic) - _expected(traffic)).max())
+    expected = expected_intensities(traffic, FRAMES, grid=grid, states=states)
+    difference = float(np.abs(_answered(running, traffic) - expected).max())
     if not difference <= TOLERANCE:
         raise BenchError(
             f"estimates differ from the model's by {difference:.2g}; expected at most {TOLERANCE:g}, so times mean "
@@ -61,14 +62,3 @@ def _answered(running: Running, traffic: Traffic) -> npt.NDArray[np.float64]:
 def _decoded(message: str | bytes) -> dict[str, Any]:
     decoded: dict[str, Any] = json.loads(message) if isinstance(message, str) else msgpack.unpackb(message)
     return decoded
-
-
-def _expected(traffic: Traffic) -> npt.NDArray[np.float64]:
-    model = Model.load(default_model_path())
-    rotations = traffic.motion(0)[None, :FRAMES]  # [1, frame, joint, 4]
-    emotion = np.zeros((1, FRAMES, len(EMOTIONS)), np.float32)
-    if traffic.emotion in EMOTIONS:
-        emotion[..., EMOTIONS.index(traffic.emotion)] = 1.0
-    mask = np.ones((1, FRAMES, len(JOINTS)), np.float32)
-    outputs = model.run(rotations, mask, emotion, model.zero_states(1))
-    return np.asarray(outputs.intensity[0], np.float64)

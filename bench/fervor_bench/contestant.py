@@ -21,6 +21,9 @@ HOST = "127.0.0.1"
 
 START_S, STOP_S = 60.0, 10.0
 
+PAUSES = "pauses"
+"""Name of the file in which a contestant in Python notes those of its collector."""
+
 SERVICE_LIMITS = {
     "FERVOR_MAX_SESSIONS": "65536",
     "FERVOR_CAPACITY": "16384",
@@ -41,32 +44,41 @@ class Contestant:
     command: Callable[[Path, int], list[str]]
     """What to run, from a folder for files and the port to listen on; raises BenchError where it can't."""
     complete: bool = False
-    """Whether it takes the whole protocol: any skeleton, several frames a message, checkpoints."""
+    """Whether it takes the whole protocol (any skeleton, checkpoints) and puts poses on a grid by their times."""
+    groups: bool = False
+    """Whether it takes several frames a message."""
+    states: int = 1
+    """Recurrent states that it keeps of a body."""
     http: bool = True
     """Whether /readyz says when it is ready; else it is when it listens."""
 
 
-def _naive(_: Path, port: int) -> list[str]:
+def _naive(folder: Path, port: int) -> list[str]:
     from fervor.model import default_model_path
 
-    return [sys.executable, "-m", "fervor_bench.naive", str(port), str(default_model_path())]
+    return [sys.executable, "-m", "fervor_bench.naive", str(port), str(default_model_path()), str(folder / PAUSES)]
 
 
 def _tuned(folder: Path, port: int) -> list[str]:
     return [*_naive(folder, port), "--tuned"]
 
 
-def _fervor(_: Path, port: int) -> list[str]:
-    return [sys.executable, "-m", "fervor_bench.serve", "--host", HOST, "--port", str(port), "--log-level", "warning"]
+def _fervor(folder: Path, port: int) -> list[str]:
+    options = ["--host", HOST, "--port", str(port), "--log-level", "warning"]
+    return [sys.executable, "-m", "fervor_bench.serve", str(folder / PAUSES), *options]
 
 
-def _floor(folder: Path, port: int) -> list[str]:
+def _floor(folder: Path, port: int, states: int = 1) -> list[str]:
     from fervor.model import default_model_path
     from fervor_bench.weights import write_weights
 
     weights = folder / "weights"
     write_weights(default_model_path(), weights)
-    return [str(build("floor", folder)), str(port), str(weights), *EMOTIONS]
+    return [str(build("floor", folder)), str(port), str(weights), str(states), *EMOTIONS]
+
+
+def _floor_two(folder: Path, port: int) -> list[str]:
+    return _floor(folder, port, 2)
 
 
 CONTESTANTS: Mapping[str, Contestant] = {
@@ -74,8 +86,17 @@ CONTESTANTS: Mapping[str, Contestant] = {
     for contestant in (
         Contestant("naive", "FastAPI, pydantic, a model call a frame, uvicorn's defaults", ("json",), _naive),
         Contestant("naive-tuned", "the same on uvloop, httptools, sans-I/O WebSocket, one thread", ("json",), _tuned),
-        Contestant("fervor", "fervor serve", ("json", "msgpack"), _fervor, complete=True),
-        Contestant("floor", "C: epoll and the network, nothing checked", ("msgpack",), _floor, http=False),
+        Contestant("fervor", "fervor serve", ("json", "msgpack"), _fervor, complete=True, groups=True, states=2),
+        Contestant("floor", "C: epoll and the network, nothing checked", ("msgpack",), _floor, groups=True, http=False),
+        Contestant(
+            "floor-two",
+            "the same with two states a body, as the service has",
+            ("msgpack",),
+            _floor_two,
+            groups=True,
+            states=2,
+            http=False,
+        ),
     )
 }
 
@@ -92,6 +113,8 @@ class Running:
     """Its process; None where it runs elsewhere."""
     start_s: float | None = None
     """From starting the process to ready."""
+    states: int = 2
+    """Recurrent states that it keeps of a body; a service elsewhere is taken for one of ours."""
 
     @property
     def address(self) -> str:
@@ -115,13 +138,15 @@ def started(contestant: Contestant, folder: Path, processor: int) -> Iterator[Ru
         port = int(probe.getsockname()[1])
     command = contestant.command(folder, port)
     log = folder / f"{contestant.name}.log"
+    (folder / PAUSES).unlink(missing_ok=True)
     environment = {name: value for name, value in os.environ.items() if not name.startswith("FERVOR_")}
     begin = time.perf_counter()
     with log.open("wb") as said, pinned(processor):
         process = subprocess.Popen(command, stdout=said, stderr=said, env=environment | SERVICE_LIMITS)
     try:
         _wait_until_ready(contestant, process, port, log)
-        yield Running(HOST, port, pid=process.pid, start_s=time.perf_counter() - begin)
+        start_s = time.perf_counter() - begin
+        yield Running(HOST, port, pid=process.pid, start_s=start_s, states=contestant.states)
     finally:
         process.terminate()
         try:

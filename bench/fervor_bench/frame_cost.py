@@ -1,45 +1,189 @@
-"""What a frame costs inside the service, without the wire, and how that grows with bodies and joints.
+"""What a frame costs inside the service, without the wire: by stage, and how that grows with bodies and joints.
 
 Absolute times drift with the machine; the ratios, taken in turn within one run, are what to compare.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from functools import partial
+from itertools import starmap
 
 import numpy as np
 import numpy.typing as npt
 from rich.table import Table
 
 from fervor.engine.engine import Engine
-from fervor.model import Model, default_model_path
-from fervor.session.body import Body, Terms
-from fervor.session.events import Pose, Source
+from fervor.model import Floats, Model, Outputs, default_model_path
+from fervor.protocol.codec import CODECS, Codec
+from fervor.protocol.messages import Frame, Limits, ModelInfo, SessionStart
+from fervor.protocol.raw_frame import RawFrame
+from fervor.session.events import Reply, Ticket
+from fervor.session.host import Host
+from fervor.session.poses import read_poses
+from fervor.session.session import Session
 from fervor.skeletons.adapter import adapt
 from fervor.skeletons.catalog import SKELETONS, skeleton
+from fervor_bench.machine import pinned
+from fervor_bench.traffic import Encoding, Traffic
 
-BATCHES = (1, 16, 64, 256)
-FRAMES = 120
-ROUNDS = 5
+CROWDS: tuple[tuple[Encoding, int], ...] = (
+    ("msgpack", 1),
+    ("msgpack", 8),
+    ("msgpack", 64),
+    ("msgpack", 256),
+    ("json", 64),
+)
+"""Encoding, and bodies that send together."""
+
+AHEAD = 130
+"""Frames before any is measured: then a body has both of its states."""
+
+FRAMES, ROUNDS = 60, 5
+"""Of each crowd; the best round of each stage counts, the one that the machine disturbed least."""
+
+STAGES = ("decode", "plan", "engine", "model", "conclude", "encode")
 
 
-def frame_costs() -> list[Table]:
-    """Measure, and show as tables: batching, joints."""
-    model = Model.load(default_model_path())
-    return [_batching(model), _adapting(model)]
+@dataclass(frozen=True, slots=True)
+class Inside:
+    """Where a frame's time goes between the sockets."""
+
+    encoding: Encoding
+    bodies: int
+    """That send together, each in a session of its own."""
+    stages_us: Mapping[str, float]
+    """Of `STAGES`, a frame; `engine` without the model."""
+
+    @property
+    def frame_us(self) -> float:
+        """All stages."""
+        return sum(self.stages_us.values())
 
 
-def _batching(model: Model) -> Table:
-    table = Table(title="a 30 Hz frame, from session to estimate, one core")
-    for heading in ("bodies together", "µs a frame", "gain over one", "model alone, µs", "share of model"):
-        table.add_column(heading, justify="right")
-    alone = None
-    for bodies in BATCHES:
-        whole = _best(partial(_stream, model, bodies)) / (bodies * FRAMES) * 1e6
-        step = _best(partial(_steps, model, bodies)) / (bodies * FRAMES) * 1e6
-        alone = alone or whole
-        table.add_row(f"{bodies}", f"{whole:.1f}", f"x {alone / whole:.1f}", f"{step:.1f}", f"{step / whole:.0%}")
-    return table
+def adapting_costs() -> Table:
+    """Measure what skeletons cost, and show it."""
+    return _adapting(Model.load(default_model_path()))
+
+
+def measure_inside(processor: int | None = None) -> Sequence[Inside]:
+    """Measure all crowds, on one processor if it is given."""
+    with nullcontext() if processor is None else pinned(processor):
+        return list(starmap(_measure, CROWDS))
+
+
+def _measure(encoding: Encoding, bodies: int) -> Inside:
+    crowd = _Crowd(encoding, bodies, AHEAD + ROUNDS * FRAMES)
+    for _ in range(AHEAD):
+        crowd.step()
+    best = dict.fromkeys(STAGES, float("inf"))
+    for _ in range(ROUNDS):
+        crowd.watch.spent.clear()
+        for _ in range(FRAMES):
+            crowd.step()
+        for stage in STAGES:
+            best[stage] = min(best[stage], crowd.watch.spent[stage])
+    return Inside(encoding, bodies, {stage: 1e6 * spent / (FRAMES * bodies) for stage, spent in best.items()})
+
+
+class _Watch:
+    """Seconds by stage; a stage within another is not the other's."""
+
+    def __init__(self) -> None:
+        self.spent: dict[str, float] = {}
+        self._inner = 0.0
+
+    @contextmanager
+    def on(self, stage: str) -> Iterator[None]:
+        outer, self._inner = self._inner, 0.0
+        begin = time.perf_counter()
+        yield
+        taken = time.perf_counter() - begin
+        self.spent[stage] = self.spent.get(stage, 0.0) + taken - self._inner
+        self._inner = outer + taken
+
+
+class _Model(Model):
+    """The model, watched."""
+
+    watch = _Watch()  # while it is loaded
+
+    def run(self, rotations: Floats, mask: Floats, emotion: Floats, states: Mapping[str, Floats]) -> Outputs:
+        with self.watch.on("model"):
+            return super().run(rotations, mask, emotion, states)
+
+
+class _Crowd:
+    """Sessions of a body each whose messages are taken together, as in one turn of the service's loop."""
+
+    def __init__(self, encoding: Encoding, bodies: int, frames: int) -> None:
+        model = _Model.load(default_model_path())
+        assert isinstance(model, _Model)
+        self.watch = model.watch = _Watch()
+        traffic = Traffic(encoding=encoding, checkpoints=False)
+        self._text = encoding == "json"
+        self._codec: Codec = CODECS[traffic.subprotocol]
+        self._engine = Engine(model, capacity=bodies)
+        host = _host(model, self._engine)
+        self._sessions = [Session(str(number), host) for number in range(bodies)]
+        for session in self._sessions:
+            session.receive(SessionStart.model_validate(traffic.start()))
+        self._agreements = [session.agreement for session in self._sessions if session.agreement is not None]
+        variants = min(bodies, 16)
+        scripts = [list(traffic.payloads(variant, frames)) for variant in range(variants)]
+        self._payloads = [list(payloads) for payloads in zip(*scripts, strict=True)]  # [frame][variant]
+        self._frame = 0
+
+    def step(self) -> None:
+        """One frame of every session, from its bytes to those of its answer."""
+        payloads = self._payloads[self._frame]
+        self._frame += 1
+        data = [payloads[place % len(payloads)] for place in range(len(self._sessions))]
+        came = [each.decode() for each in data] if self._text else data
+        decode_raw, decode, encode = self._codec.decode_raw, self._codec.decode_client, self._codec.encode
+        with self.watch.on("decode"):
+            frames = [_frame(decode_raw(each) or decode(each)) for each in came]
+            poses = read_poses(list(zip(self._agreements, frames, strict=True)))
+        with self.watch.on("plan"):
+            tickets = [
+                event
+                for session, frame, pose in zip(self._sessions, frames, poses, strict=True)
+                for event in session.receive(frame, [pose])
+                if isinstance(event, Ticket)
+            ]
+        with self.watch.on("engine"):
+            outcomes = self._engine.run(tickets)
+        with self.watch.on("conclude"):
+            replies = [
+                event.message
+                for session, ticket, outcome in zip(self._sessions, tickets, outcomes, strict=True)
+                for event in session.conclude(ticket, outcome)
+                if isinstance(event, Reply)
+            ]
+        with self.watch.on("encode"):
+            answers = [encode(reply) for reply in replies]
+        assert len(answers) == len(self._sessions)
+
+
+def _frame(message: object) -> Frame | RawFrame:
+    assert isinstance(message, Frame | RawFrame)
+    return message
+
+
+def _host(model: Model, engine: Engine) -> Host:
+    """A service without a wire."""
+    metadata = model.metadata
+    info = ModelInfo(
+        name=metadata.name,
+        version=metadata.version,
+        purpose=metadata.purpose,
+        sha256=model.sha256,
+        rate_hz=metadata.rate_hz,
+        emotions=metadata.emotions,
+        thresholds=metadata.levels.threshold,
+    )
+    return Host(info, metadata, Limits(), model.fingerprint, engine.claim)
 
 
 def _adapting(model: Model) -> Table:
@@ -54,18 +198,6 @@ def _adapting(model: Model) -> Table:
         cost = _best(partial(adapt, known, rotations, observed, axes=known.axes))
         table.add_row(name, f"{len(known.joints)}", f"{cost * 1e6:.0f}", f"{cost / step:.0%}")
     return table
-
-
-def _stream(model: Model, bodies: int) -> None:
-    known = skeleton("c13")
-    terms = Terms(model.metadata, Source(known, known.axes))
-    engine = Engine(model, capacity=bodies)
-    crowd = [Body(str(number), engine.claim(), terms) for number in range(bodies)]
-    poses = [Pose(rotations, np.ones(13, np.bool_)) for rotations in _motion(FRAMES, 13)]
-    for seq, pose in enumerate(poses):
-        tickets = [body.plan(seq, seq / 30.0, pose) for body in crowd]
-        for body, ticket, outcome in zip(crowd, tickets, engine.run(tickets), strict=True):
-            body.conclude(ticket, outcome)  # type: ignore[arg-type]  # the packaged model does not fail
 
 
 def _steps(model: Model, bodies: int) -> None:

@@ -18,9 +18,13 @@ from fervor_bench.machine import pinned
 
 Loop = Literal["open", "closed"]
 Arrivals = Literal["random", "lockstep"]
+Waits = Literal["spin", "sleep"]
 
 CONNECT_S = 90.0
 """Longest wait for all sessions to be started."""
+
+SETTLE_S = 60.0
+"""Longest that they may take to settle; see load.c."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,10 @@ class Load:
     warmup_s: float = 1.0
     seconds: float = 5.0
     """The window that is measured, after the warm-up."""
+    settle_s: float = 0.0
+    """Seconds of the sensors' clocks that every session sends before it all, as fast as it is answered."""
+    waits: Waits = "sleep"
+    """How the generator waits: `spin` keeps its processor busy and times exact, `sleep` leaves room for others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +65,8 @@ class Seen:
     dry: bool
     """The script came to its end before the window did."""
     window_s: float
-    cpu_s: float
-    """The generator's own processor time."""
+    busy_s: float
+    """How long the generator had work: its processor time, or where it spins, what it was not waiting."""
     latencies: npt.NDArray[np.float32]  # [frame] µs, of the frames due (open loop) or answered in the window
     lags: npt.NDArray[np.float32]  # [message] µs, how late the generator was; open loop
 
@@ -70,16 +78,36 @@ class Generator:
     """
 
     def __init__(
-        self, program: Path, script: Path, *, address: tuple[str, int], load: Load, processor: int, result: Path
+        self,
+        program: Path,
+        script: Path,
+        *,
+        address: tuple[str, int],
+        load: Load,
+        settle: int,
+        processor: int,
+        result: Path,
     ) -> None:
+        """Start it.
+
+        Args:
+            program: the compiled `load`.
+            script: what it sends, as `Traffic.write` makes it.
+            address: host and port of the service.
+            load: how much, and when.
+            settle: messages of a session that go ahead of the schedule.
+            processor: to run on.
+            result: the file for what it saw.
+        """
         self._load = load
         self._result = result
         host, port = address
         where = [str(program), host, str(port), str(script), str(result)]
-        how = [str(load.sessions), load.loop, load.arrivals, str(load.warmup_s), str(load.seconds)]
+        how = [str(load.sessions), load.loop, load.arrivals, load.waits]
+        times = [str(settle), str(load.warmup_s), str(load.seconds)]
         with pinned(processor):
             self._process = subprocess.Popen(
-                [*where, *how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+                [*where, *how, *times], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
             )  # no buffer: `select` must see every line that was not read
 
     def __enter__(self) -> Self:
@@ -111,7 +139,7 @@ class Generator:
         assert self._process.stdin is not None
         with suppress(BrokenPipeError):
             self._process.stdin.write(b"go\n")
-        patience = self._load.warmup_s + self._load.seconds + 30.0
+        patience = SETTLE_S + self._load.warmup_s + self._load.seconds + 30.0
         if self._hear("", patience) == "begin":
             at_begin()
             self._hear("end", patience)

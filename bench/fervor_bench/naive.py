@@ -4,7 +4,7 @@ One state a body, no batching, no gaps, no checkpoints. It answers the same firs
 load generator does for both. `--tuned` adds what is a matter of options: uvloop, httptools, the sans-I/O WebSocket
 protocol, no compression, and one thread for onnxruntime.
 
-    python -m fervor_bench.naive PORT MODEL [--tuned]
+    python -m fervor_bench.naive PORT MODEL PAUSES [--tuned]
 """
 
 import argparse
@@ -21,6 +21,7 @@ from pydantic import BaseModel, Field, TypeAdapter
 
 from fervor.emotions import EMOTIONS
 from fervor.metadata import INTENSITY, NEXT
+from fervor_bench.pauses import note_pauses
 
 Floats = npt.NDArray[np.float32]
 
@@ -130,8 +131,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m fervor_bench.naive")
     parser.add_argument("port", type=int)
     parser.add_argument("model", type=Path)
+    parser.add_argument("pauses", type=Path)
     parser.add_argument("--tuned", action="store_true")
     options = parser.parse_args()
+    note_pauses(options.pauses)
     app = create_app(Network(options.model, tuned=options.tuned))
     how: dict[str, Any] = {"loop": "asyncio", "http": "h11", "ws": "websockets"}  # a bare `pip install uvicorn`
     if options.tuned:

@@ -10,6 +10,11 @@ from fervor_bench.traffic import Encoding, Traffic
 
 Encodings = Literal["json", "msgpack", "both"]
 
+SETTLE_S = 4.2
+"""After so long on a sensor's clock a body of the service has both of its states, and costs what it will."""
+
+WARMUP_S = 1.0
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -18,11 +23,15 @@ class Plan:
     contestants: tuple[str, ...] = tuple(CONTESTANTS)
     encoding: Encodings = "both"
     traffic: Traffic = field(default_factory=Traffic)
-    sessions: tuple[int, ...] = (1, 100, 1000)
+    frames: tuple[int, ...] = (1, 6)
+    """Frames in a message, tried one by one by who takes several."""
+    sessions: tuple[int, ...] = (100, 1000)
     """Numbers of sessions to try one by one."""
     loop: Loop = "open"
     arrivals: Arrivals = "random"
     seconds: float = 3.0
+    lone_s: float = 10.0
+    """Measured time of a lone session; 0: none is measured."""
     saturated: int = 64
     """Sessions of the closed loop that fills the contestant's processor."""
     idle: int = 1000
@@ -31,53 +40,67 @@ class Plan:
     """Where the search for the capacity ends; 0: no search."""
     resolution: float = 0.05
     attempts: int = 2
+    confirm_s: float = 10.0
+    """Measured time of the trial that has the last word on a capacity."""
 
     def __post_init__(self) -> None:
         for name in self.contestants:
             if name not in CONTESTANTS:
                 raise BenchError(f"contestant {name} is not known; expected some of {', '.join(CONTESTANTS)}")
 
-    def load(self, sessions: int) -> Load:
-        """One of the numbers of sessions."""
-        return Load(sessions, self.loop, self.arrivals, warmup_s=min(1.0, self.seconds / 2), seconds=self.seconds)
+    def load(self, sessions: int, *, seconds: float | None = None, settled: bool) -> Load:
+        """One of the numbers of sessions; those that are not `settled` after connecting get there first."""
+        seconds = self.seconds if seconds is None else seconds
+        warmup_s = min(WARMUP_S, seconds / 2)
+        settle_s = 0.0 if settled else SETTLE_S
+        return Load(sessions, self.loop, self.arrivals, warmup_s, seconds, settle_s=settle_s, waits="spin")
 
-    def filled(self, sessions: int) -> Load:
+    def filled(self, sessions: int, *, settled: bool) -> Load:
         """The closed loop."""
-        return Load(sessions, "closed", warmup_s=min(0.5, self.seconds / 2), seconds=self.seconds)
+        return replace(self.load(sessions, settled=settled), loop="closed", warmup_s=min(0.5, self.seconds / 2))
 
     def entries(self) -> list[tuple[Contestant, Traffic]]:
-        """Who runs with which traffic; a simple contestant gets what it understands."""
-        return [
-            (contestant, self.traffic_for(contestant, encoding))
-            for contestant in (CONTESTANTS[name] for name in self.contestants)
-            for encoding in contestant.encodings
-            if self.encoding in (encoding, "both")
-        ]
-
-    def traffic_for(self, contestant: Contestant, encoding: Encoding) -> Traffic:
-        """The traffic in one encoding.
+        """Who runs with which traffic; a simple contestant gets what it understands.
 
         Raises:
-            BenchError: a simple contestant can't take so many joints or frames a message.
+            BenchError: a contestant can't take any of it.
         """
-        traffic = replace(self.traffic, encoding=encoding)
-        if contestant.complete:
-            return traffic
-        plain = traffic.frames_per_message == 1 or contestant.name == "floor"
-        if traffic.joints != 13 or not plain:
+        found = []
+        for contestant in (CONTESTANTS[name] for name in self.contestants):
+            self._check(contestant)
+            for encoding in contestant.encodings:
+                if self.encoding in (encoding, "both"):
+                    found += [(contestant, traffic) for traffic in self.traffics(contestant, encoding)]
+        return found
+
+    def traffics(self, contestant: Contestant | None, encoding: Encoding) -> list[Traffic]:
+        """The traffic of a contestant in one encoding, by frames a message; None: of a service elsewhere."""
+        simple = contestant is not None and not contestant.complete
+        traffic = replace(self.traffic, encoding=encoding, checkpoints=self.traffic.checkpoints and not simple)
+        return [
+            replace(traffic, frames_per_message=frames)
+            for frames in self.frames
+            if contestant is None or contestant.groups or frames == 1
+        ]
+
+    def _check(self, contestant: Contestant) -> None:
+        one = contestant.groups or 1 in self.frames
+        if not contestant.complete and (self.traffic.joints != 13 or not one):
             raise BenchError(
                 f"{contestant.name} takes 13 joints and one frame a message; leave it out with --contestants fervor"
             )
-        return replace(traffic, checkpoints=False)
 
 
 QUICK = Plan(
     contestants=("naive-tuned", "fervor", "floor"),
-    sessions=(1,),
+    frames=(1,),
+    sessions=(),
     seconds=0.8,
+    lone_s=2.0,
     idle=100,
     most_sessions=4000,
     resolution=0.25,
     attempts=1,
+    confirm_s=0.0,
 )
-"""Under a minute; its figures are rough."""
+"""About a minute; its figures are rough."""

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from fervor_bench.frame_cost import Inside
 from fervor_bench.machine import Machine
 from fervor_bench.plan import Plan
 from fervor_bench.scoring import Beside, Rates
@@ -36,6 +37,7 @@ class Results:
     left_out: Sequence[str] = ()
     """Sentences: which contestant was not measured, and why."""
     breakdowns: Sequence[Breakdown] = ()
+    insides: Sequence[Inside] = ()
     rates: Rates | None = None
     beside: Beside | None = None
     made: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))

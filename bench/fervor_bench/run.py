@@ -2,7 +2,7 @@
 
 import resource
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from fervor.errors import InputError
 from fervor_bench.contestant import CONTESTANTS, Contestant, Running, started
 from fervor_bench.errors import BenchError
+from fervor_bench.frame_cost import Inside, measure_inside
 from fervor_bench.generator import Load
 from fervor_bench.machine import Places, choose_places, describe_machine
 from fervor_bench.plan import Plan
@@ -18,10 +19,12 @@ from fervor_bench.results import Breakdown, Results
 from fervor_bench.scoring import Beside, Rates, measure_beside, measure_rates
 from fervor_bench.stages import read_stacks, sampled, share_out
 from fervor_bench.standing import Told, measure, stand
-from fervor_bench.traffic import Traffic
+from fervor_bench.traffic import Encoding, Traffic
 from fervor_bench.trial import Track
 
 PATH = "/v1/stream"
+
+ENCODINGS: tuple[Encoding, ...] = ("json", "msgpack")
 
 LIVE_SESSIONS = 100
 """Beside a client that scores."""
@@ -35,16 +38,21 @@ def measure_all(plan: Plan, *, stages: bool, scoring: bool, told: Told) -> Resul
     """
     machine, places = describe_machine(), choose_places()
     standings, left_out, breakdowns = [], [], []
+    insides: Sequence[Inside] = ()
     rates: Rates | None = None
     beside: Beside | None = None
     with _workshop() as folder:
         for contestant, traffic in plan.entries():
             try:
                 standings.append(stand(contestant, traffic, plan, folder=folder, places=places, told=told))
-                if stages and contestant.complete:
+                if stages and contestant.complete and traffic.frames_per_message == 1:
+                    told(f"{contestant.name}, {traffic.encoding}: stages")
                     breakdowns.append(_break_down(contestant, traffic, plan, folder, places))
             except BenchError as error:
                 left_out.append(f"{contestant.name}, {traffic.encoding}: not measured: {error.message}")
+        if stages:
+            told("inside the service")
+            insides = measure_inside(processor=places.server)
         if scoring:
             told("scoring")
             rates, beside = _measure_scoring(plan, folder, places)
@@ -56,6 +64,7 @@ def measure_all(plan: Plan, *, stages: bool, scoring: bool, told: Told) -> Resul
         standings=standings,
         left_out=left_out,
         breakdowns=breakdowns,
+        insides=insides,
         rates=rates,
         beside=beside,
     )
@@ -72,11 +81,11 @@ def measure_url(url: str, plan: Plan, *, token: str, told: Told) -> Results:
     machine, places = describe_machine(), choose_places()
     standings = []
     with _workshop() as folder:
-        for encoding in ("json", "msgpack"):
+        for encoding in ENCODINGS:
             if plan.encoding in (encoding, "both"):
-                track = Track(folder, places, replace(plan.traffic, encoding=encoding))
-                found = measure(running, track, plan, told=told, name=f"{url}, {encoding}")
-                standings.append(replace(found, contestant=url))
+                for traffic in plan.traffics(None, encoding):
+                    found = measure(running, Track(folder, places, traffic), plan, told=told, name=f"{url}, {encoding}")
+                    standings.append(replace(found, contestant=url))
     return Results(machine=machine, plan=plan, standings=standings)
 
 
@@ -103,8 +112,9 @@ def _break_down(contestant: Contestant, traffic: Traffic, plan: Plan, folder: Pa
     with started(contestant, folder, places.server) as running:
         assert running.pid is not None
         track = Track(folder, places, traffic)
+        load = plan.filled(plan.saturated, settled=False)
         with sampled(running.pid, stacks):
-            trial = track.run(running, plan.filled(plan.saturated))
+            trial = track.run(running, replace(load, waits="sleep"))  # the sampler shares the generator's processor
     name = f"{contestant.name}, {traffic.encoding}"
     return Breakdown(name, plan.saturated, trial.server_us or 0.0, tuple(share_out(read_stacks(stacks))))
 

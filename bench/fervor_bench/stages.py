@@ -1,9 +1,12 @@
 """Where a frame's microseconds go: a running service sampled from outside, by the innermost part of ours on the stack.
 
-py-spy looks at the interpreter's stacks a few hundred times a second without stopping it. A sample belongs to the
-first rule that fits, from the innermost function outwards; what a library does is its caller's.
+py-spy looks at the interpreter's stacks a few hundred times a second, and on x86 at what C does below it, the calls of
+the kernel included. A sample belongs to the first rule that fits, from the innermost function outwards; what a library
+does is its caller's. Rules go by package, so that they outlive a file's name.
 """
 
+import ctypes
+import platform
 import re
 import shutil
 import subprocess
@@ -18,27 +21,31 @@ from fervor_bench.errors import BenchError
 
 SAMPLES_PER_SECOND = 250
 
+PR_SET_PTRACER, PR_SET_PTRACER_ANY = 0x59616D61, -1
+"""Of prctl(2)."""
+
+PROGRAM = "fervor_bench/serve.py"
+"""At the root of the service's own thread; others only wait."""
+
 RULES: tuple[tuple[str, str], ...] = (
-    (
-        "parse and validate",
-        r"decode_(client|frames)|_from_raw|_joints_of|fervor/protocol/(frame_decoder|poses|lean_frame)|fervor/session/poses|fervor/server/pace",
-    ),
-    ("encode", r"\bencode\b.*fervor/protocol|fervor/server/encod"),
-    ("checkpoint", r"checkpoint|sealing"),
-    ("model", r"fervor/model\.py"),
-    ("engine", r"fervor/(engine|skeletons|rotations|emotions)"),
-    ("session", r"fervor/(session|levels)"),
-    ("send", r"\b(write|_as_frame)\b.*fervor/server/websocket_protocol"),
-    ("send", r"fervor/server/outbox|\bsend(_\w+)?\b.*(uvicorn|starlette|websockets)|\b_?(write|send)\w*\b.*asyncio"),
-    ("receive", r"fervor/server/(cutter|websocket_protocol)"),
-    ("receive", r"data_received|handle_\w+.*uvicorn|\breceive\w*\b|(websockets)/(frames|protocol|streams)"),
-    ("metrics", r"fervor/server/metrics|prometheus_client"),
-    ("conversation", r"fervor/server"),
+    ("kernel: write", r"^(__)?(libc_)?(write|writev|send|sendmsg|sendto)\b.*\(libc"),
+    ("kernel: read", r"^(__)?(libc_)?(read|readv|recv|recvmsg|recvfrom)\b.*\(libc"),
+    ("kernel: poll", r"^epoll_p?wait"),
+    ("collector", r"^gc_collect\w*"),
+    ("model", r"\((fervor/model\.py|onnxruntime/)"),
+    ("checkpoint", r"(checkpoint|seal).*\(fervor/|\(fervor/.*(checkpoint|seal)"),
+    ("encode", r"encod.*\(fervor/|\(fervor/.*encod"),
+    ("decode", r"\(fervor/(protocol/(?!trusted|messages|estimate)|session/poses)|\bdecode\w*.*\(fervor/"),
+    ("engine", r"\(fervor/(engine|skeletons|rotations|emotions)"),
+    ("session", r"\(fervor/(session|levels|calibration)"),
+    ("send", r"(\bwrite|\bsend|_as_frame).*\(fervor/server|\(fervor/server/(outbox|wire|asgi_wire)"),
+    ("receive", r"\(fervor/server/(websocket|direct_wire|cutter|parser)"),
+    ("conversation", r"\(fervor/server/(?!run\b|worker|supervisor)"),
 )
 """Stage, and a pattern of `function (file`; the first that fits."""
 
 REST = "event loop"
-"""What no rule claims: the loop itself, the kernel's part of reading and polling, the collector."""
+"""What no rule claims: the loop itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +65,13 @@ def share_out(stacks: Mapping[str, int]) -> list[Stage]:
     """
     counts: Counter[str] = Counter()
     for stack, samples in stacks.items():
-        counts[_stage_of(stack)] += samples
+        counts[stage_of(stack)] += samples
     total = sum(counts.values())
     return [Stage(name, samples / total) for name, samples in counts.most_common()]
 
 
-def _stage_of(stack: str) -> str:
+def stage_of(stack: str) -> str:
+    """The stage that a sample belongs to."""
     for frame in reversed(stack.split(";")):
         for stage, pattern in RULES:
             if re.search(pattern, frame):
@@ -71,13 +79,20 @@ def _stage_of(stack: str) -> str:
     return REST
 
 
-def read_stacks(path: Path) -> dict[str, int]:
-    """Samples by stack from py-spy's `raw` format."""
+def read_stacks(path: Path, program: str = PROGRAM) -> dict[str, int]:
+    """Samples by stack from py-spy's `raw` format, of the thread that runs a program."""
     stacks: Counter[str] = Counter()
     for line in path.read_text(encoding="utf-8").splitlines():
         stack, _, samples = line.rpartition(" ")
-        stacks[stack] += int(samples)
+        if program in stack:
+            stacks[stack] += int(samples)
     return dict(stacks)
+
+
+def allow_sampling() -> None:
+    """Let any process of this user look into this one, where Linux (Yama) keeps that to parents."""
+    # Where there is no Yama this is refused, and not needed.
+    ctypes.CDLL(None).prctl(PR_SET_PTRACER, ctypes.c_long(PR_SET_PTRACER_ANY), 0, 0, 0)
 
 
 @contextmanager
@@ -90,9 +105,11 @@ def sampled(pid: int, path: Path) -> Iterator[None]:
     spy = shutil.which("py-spy", path=str(Path(sys.executable).parent)) or shutil.which("py-spy")
     if spy is None:
         raise BenchError("stages need py-spy, which is not installed: pip install 'fervor[bench]'")
-    rate = str(SAMPLES_PER_SECOND)
-    command = [spy, "record", "--pid", str(pid), "--nonblocking", "--rate", rate, "--format", "raw", "-o", str(path)]
-    process = subprocess.Popen([*command, "--duration", "unlimited"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    how = "--native" if platform.machine() == "x86_64" else "--nonblocking"
+    command = [spy, "record", "--pid", str(pid), how, "--rate", str(SAMPLES_PER_SECOND), "--format", "raw"]
+    process = subprocess.Popen(
+        [*command, "--output", str(path), "--duration", "unlimited"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     try:
         yield
     finally:

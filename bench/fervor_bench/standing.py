@@ -1,4 +1,4 @@
-"""All that is measured of one contestant in one encoding."""
+"""All that is measured of one contestant with one kind of messages."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,8 +6,10 @@ from pathlib import Path
 
 from fervor_bench.capacity import MOST_P99_MS, Capacity, Verdict, find_capacity
 from fervor_bench.check import check_estimates
-from fervor_bench.contestant import Contestant, Running, started
+from fervor_bench.contestant import PAUSES, Contestant, Running, started
+from fervor_bench.lone import Lone, measure_lone
 from fervor_bench.machine import Places
+from fervor_bench.pauses import Pauses, read_pauses
 from fervor_bench.plan import Plan
 from fervor_bench.traffic import Encoding, Traffic
 from fervor_bench.trial import Track, Trial
@@ -25,19 +27,33 @@ class Standing:
 
     contestant: str
     encoding: Encoding
+    frames: int
+    """In a message."""
     difference: float | None
     """Largest difference of its estimates from the model's."""
     start_s: float | None
     idle_kib: float | None
     """Resident memory of an idle session, beyond the kernel's socket."""
+    lone: Lone | None
     saturated: Trial | None
     capacity: Capacity | None
+    confirmed: Trial | None
+    """The longest trial of that many sessions."""
     trials: tuple[Trial, ...]
+    pauses: Pauses | None
+    """Of the collector, in all open loops together."""
 
     @property
     def name(self) -> str:
-        """Contestant and encoding."""
-        return f"{self.contestant}, {self.encoding}"
+        """Contestant and messages."""
+        several = f", {self.frames} frames a message" if self.frames > 1 else ""
+        return f"{self.contestant}, {self.encoding}{several}"
+
+    @property
+    def all_trials(self) -> tuple[Trial, ...]:
+        """Everything that is shown."""
+        few = (self.saturated, self.confirmed)
+        return (*(self.lone.trials if self.lone else ()), *(trial for trial in few if trial), *self.trials)
 
 
 def stand(
@@ -48,48 +64,76 @@ def stand(
     Raises:
         BenchError: it can't run here, or its estimates are not the model's.
     """
-    told(f"{contestant.name}, {traffic.encoding}: starting")
+    name = f"{contestant.name}, {traffic.encoding}"
+    told(f"{name}: starting")
     with started(contestant, folder, places.server) as running:
         track = Track(folder, places, traffic)
         # Memory first: what earlier sessions gave back would be taken again and not show.
-        idle = track.idle_kib(running, plan.idle) if plan.idle else None
-        plain = replace(traffic, joints=13, bodies=1, frames_per_message=1, checkpoints=False)
-        difference = check_estimates(running, plain)
-        measured = measure(running, track, plan, told=told, name=f"{contestant.name}, {traffic.encoding}")
-    return replace(measured, contestant=contestant.name, idle_kib=idle, difference=difference)
+        idle = track.idle_kib(running, plan.idle) if plan.idle and traffic.frames_per_message == 1 else None
+        plain = replace(traffic, joints=13, bodies=1, checkpoints=False)
+        difference = check_estimates(running, plain, grid=contestant.complete, states=contestant.states)
+        measured = measure(running, track, plan, told=told, name=name)
+    windows = [trial.window for trial in measured.all_trials if trial.window and trial.load.loop == "open"]
+    pauses = read_pauses(folder / PAUSES, windows)
+    return replace(measured, contestant=contestant.name, idle_kib=idle, difference=difference, pauses=pauses)
 
 
 def measure(running: Running, track: Track, plan: Plan, *, told: Told, name: str) -> Standing:
     """Put all loads of a plan on a service that runs."""
+    traffic, settled = track.traffic, running.states == 1
+    lone = None
+    if plan.lone_s and traffic.frames_per_message == traffic.bodies == 1:
+        told(f"{name}: a lone session")
+        lone = measure_lone(running, track, plan)
     told(f"{name}: saturated")
-    saturated = track.run(running, plan.filled(plan.saturated))
+    saturated = track.run(running, plan.filled(plan.saturated, settled=settled))
     trials = []
     for sessions in plan.sessions:
         told(f"{name}: {sessions} sessions")
-        trials.append(track.run(running, plan.load(sessions)))
-    capacity = None
+        trials.append(track.run(running, plan.load(sessions, settled=settled)))
+    capacity, confirmed = None, None
     if plan.most_sessions:
-        capacity = _search(running, track, plan, saturated, told=told, name=name)
+        capacity, confirmed = _search(running, track, plan, saturated, told=told, name=name)
     return Standing(
         contestant=name,
-        encoding=track.traffic.encoding,
+        encoding=traffic.encoding,
+        frames=traffic.frames_per_message,
         difference=None,
         start_s=running.start_s,
         idle_kib=None,
+        lone=lone,
         saturated=saturated,
         capacity=capacity,
+        confirmed=confirmed,
         trials=tuple(trials),
+        pauses=None,
     )
 
 
-def _search(running: Running, track: Track, plan: Plan, saturated: Trial, *, told: Told, name: str) -> Capacity:
-    def judge(sessions: int) -> Verdict:
+def _search(
+    running: Running, track: Track, plan: Plan, saturated: Trial, *, told: Told, name: str
+) -> tuple[Capacity, Trial | None]:
+    """The capacity, and the last trial that kept it."""
+    kept: dict[int, Trial] = {}
+
+    def judge(sessions: int, seconds: float = plan.seconds) -> Verdict:
         told(f"{name}: does it keep {sessions} sessions?")
-        trial = track.run(running, replace(plan.load(sessions), loop="open"))
-        return Verdict(keeps=trial.keeps(MOST_P99_MS), valid=trial.valid)
+        load = replace(plan.load(sessions, seconds=seconds, settled=running.states == 1), loop="open")
+        trial = track.run(running, load)
+        if trial.keeps(MOST_P99_MS):
+            kept[sessions] = trial
+        return Verdict(keeps=kept.get(sessions) is trial, valid=trial.valid)
+
+    def confirm(sessions: int) -> Verdict:
+        return judge(sessions, plan.confirm_s)
 
     per_session = track.traffic.rate_hz * track.traffic.bodies
-    first = int(FILL_SHARE * saturated.frames_per_second / per_session)
-    return find_capacity(
-        judge, first=first, most=plan.most_sessions, resolution=plan.resolution, attempts=plan.attempts
+    found = find_capacity(
+        judge,
+        first=int(FILL_SHARE * saturated.frames_per_second / per_session),
+        most=plan.most_sessions,
+        resolution=plan.resolution,
+        attempts=plan.attempts,
+        confirm=confirm if plan.confirm_s else None,
     )
+    return found, kept.get(found.sessions)

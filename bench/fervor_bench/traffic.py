@@ -1,8 +1,11 @@
 """What sessions send: every byte of a run, made before it.
 
 All sessions of a variant send the same messages, masked and framed once, so that the generator only has to hand bytes
-to the kernel. Frames are numbered through a session: frame n is step n // bodies of body n % bodies, and message m
+to the kernel. Frames are numbered through a session: frame n is picture n // bodies of body n % bodies, and message m
 holds the frames from m · frames_per_message on.
+
+Times in the frames are a sensor's: they begin anywhere, and every one is off by up to `jitter_s`. So the service has to
+put poses on its grid by SLERP, and a frame brings no step of it, one, or two.
 """
 
 import base64
@@ -45,6 +48,8 @@ class Traffic:
     frames_per_message: int = 1
     rate_hz: float = 30.0
     """Frames a second of each body."""
+    jitter_s: float = 0.004
+    """How far a frame's time may be off, either way, seconds; 0: none is, which spares the service the SLERP."""
     checkpoints: bool = True
     """One a second and body."""
     emotion: str = "joy"
@@ -56,6 +61,11 @@ class Traffic:
                 f"{self.frames_per_message} frames in a message do not go with {self.bodies} bodies; "
                 "expected one to be a multiple of the other"
             )
+        if not 0.0 <= self.jitter_s < 0.5 / self.rate_hz:
+            raise BenchError(
+                f"times that are off by {1000 * self.jitter_s:g} ms may not rise; "
+                f"expected 0 or more, and less than {500 / self.rate_hz:.3g}"
+            )
 
     @property
     def skeleton(self) -> str:
@@ -65,6 +75,16 @@ class Traffic:
                 return name
         counts = sorted({len(known.joints) for known in SKELETONS.values() if known.quaternion == "xyzw"})
         raise BenchError(f"no skeleton has {self.joints} joints; expected one of {', '.join(map(str, counts))}")
+
+    @property
+    def messages_per_turn(self) -> int:
+        """Messages of a session that are due together."""
+        return max(self.bodies // self.frames_per_message, 1)
+
+    @property
+    def pictures_per_turn(self) -> int:
+        """Pictures of the sensor in them."""
+        return max(self.frames_per_message // self.bodies, 1)
 
     @property
     def subprotocol(self) -> str:
@@ -86,9 +106,18 @@ class Traffic:
         q = np.concatenate([vector, np.ones((CYCLE, self.joints, 1))], axis=-1)
         return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True), np.float32).round(6)
 
+    def times(self, variant: int, pictures: int) -> npt.NDArray[np.float64]:
+        """The times of the first pictures, seconds on the sensor's clock: [picture]; whole microseconds, or exact."""
+        random = np.random.default_rng((variant, 1))
+        begin = random.uniform(1.0, 10.0) if self.jitter_s else 0.0
+        jitter = random.uniform(-self.jitter_s, self.jitter_s, pictures)
+        times: npt.NDArray[np.float64] = begin + np.arange(pictures) / self.rate_hz + jitter
+        return times.round(6) if self.jitter_s else times
+
     def payloads(self, variant: int, messages: int) -> Iterator[bytes]:
         """The messages in order, as they are before framing."""
-        parts = _FrameWriter(self, self.motion(variant))
+        pictures = -(-messages * self.frames_per_message // self.bodies)
+        parts = _FrameWriter(self, self.motion(variant), self.times(variant, pictures))
         for message in range(messages):
             first = message * self.frames_per_message
             yield parts.message(range(first, first + self.frames_per_message))
@@ -149,8 +178,9 @@ class Traffic:
 class _FrameWriter:
     """Writes frames of one motion; what does not change from cycle to cycle is encoded once."""
 
-    def __init__(self, traffic: Traffic, motion: npt.NDArray[np.float32]) -> None:
+    def __init__(self, traffic: Traffic, motion: npt.NDArray[np.float32], times: npt.NDArray[np.float64]) -> None:
         self._traffic = traffic
+        self._times = times.tolist()
         self._json = traffic.encoding == "json"
         if self._json:
             self._poses = [json.dumps(_shorter(pose), separators=(",", ":")).encode() for pose in motion]
@@ -167,9 +197,9 @@ class _FrameWriter:
         return b"\x82\xa4type\xa6frames\xa6frames" + _array_head(len(frames)) + b"".join(frames)
 
     def _frame(self, number: int) -> bytes:
-        step, body = divmod(number, self._traffic.bodies)
-        t = step / self._traffic.rate_hz
-        pose = self._poses[step % CYCLE]
+        picture, body = divmod(number, self._traffic.bodies)
+        t = self._times[picture]
+        pose = self._poses[picture % CYCLE]
         if self._json:
             return b'{"type":"frame","body":"%d","seq":%d,"t":%.6f,"q":%b}' % (body, number, t, pose)
         head = b"\x85\xa4type\xa5frame\xa4body" + bytes(msgpack.packb(str(body))) + b"\xa3seq"

@@ -1,6 +1,7 @@
 """One measurement: a load on a running contestant, and what came of it."""
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,11 +12,15 @@ from fervor_bench.generator import Generator, Load, Seen
 from fervor_bench.latency import Latency
 from fervor_bench.machine import Places
 from fervor_bench.native import build
+from fervor_bench.pauses import Window
 from fervor_bench.traffic import Traffic
 from fervor_bench.usage import busy_seconds, cpu_seconds, resident_kib
 
-VARIANTS = 8
-"""Different motions in one run."""
+VARIANTS, LEAST_VARIANTS = 32, 8
+"""Different motions and clocks in one run: so many, or fewer where scripts would get long."""
+
+MOST_PAYLOADS = 100_000
+"""In a script, unless that leaves it fewer than `LEAST_VARIANTS`."""
 
 MOST_MESSAGES = 40_000
 """Of one variant: a closed loop may come to their end, which ends its window."""
@@ -54,6 +59,8 @@ class Trial:
     """Of the other processor, by the load generator."""
     lag_p99_ms: float
     """The generator's delay; part of the latency, since that counts from the schedule."""
+    window: Window | None
+    """When it was measured; None where the contestant's process is elsewhere."""
     unanswered: int
     checkpoints: int
     failures: tuple[str, ...] = field(default=())
@@ -72,15 +79,13 @@ class Trial:
 
 
 class Used(NamedTuple):
-    """Processor time, seconds."""
+    """Processor time in a window, seconds."""
 
     server_s: float
     """Of the contestant's process."""
     busy_s: float
     """Of its processor, whoever used it."""
-
-    def __sub__(self, earlier: "Used") -> "Used":
-        return Used(self.server_s - earlier.server_s, self.busy_s - earlier.busy_s)
+    window: Window
 
 
 class Track:
@@ -102,22 +107,31 @@ class Track:
         self.traffic = traffic
         self._used = used
 
-    def run(self, running: Running, load: Load) -> Trial:
+    def run(self, running: Running, load: Load, *, beside: int | None = None) -> Trial:
         """Put a load on a contestant.
+
+        Args:
+            running: the contestant.
+            load: what it gets.
+            beside: a process that may use its processor too.
 
         Raises:
             BenchError: no session could be started, or the generator failed.
         """
-        notes: list[Used] = []
+        notes: list[tuple[float, float, float]] = []
 
         def note() -> None:
             if running.pid is not None:
-                notes.append(Used(self._used(running.pid), busy_seconds(self.places.server)))
+                busy = busy_seconds(self.places.server) - (cpu_seconds(beside) if beside else 0.0)
+                notes.append((time.monotonic(), self._used(running.pid), busy))
 
         with self._generator(running, load) as generator:
             generator.wait_until_ready()
             seen = generator.run(note, note)
-        return conclude(load, seen, notes[1] - notes[0] if len(notes) == 2 else None)
+        if len(notes) < 2:
+            return conclude(load, seen, None)
+        (begin, server, busy), (end, server_after, busy_after) = notes
+        return conclude(load, seen, Used(server_after - server, busy_after - busy, (begin, end)))
 
     def idle_kib(self, running: Running, sessions: int) -> float:
         """Resident memory that each of so many idle sessions costs a contestant, KiB."""
@@ -131,12 +145,13 @@ class Track:
 
     def _generator(self, running: Running, load: Load) -> Generator:
         script = self.folder / "script"
+        messages = messages_needed(load, self.traffic)
         self.traffic.write(
             script,
             address=running.address,
             target=running.path,
-            variants=min(VARIANTS, load.sessions),
-            messages=messages_needed(load, self.traffic),
+            variants=min(max(min(VARIANTS, MOST_PAYLOADS // messages), LEAST_VARIANTS), load.sessions),
+            messages=messages,
             token=running.token,
         )
         return Generator(
@@ -144,25 +159,32 @@ class Track:
             script,
             address=(running.host, running.port),
             load=load,
+            settle=messages_to_settle(load, self.traffic),
             processor=self.places.generator,
             result=self.folder / "result",
         )
 
 
+def messages_to_settle(load: Load, traffic: Traffic) -> int:
+    """Messages that one session sends ahead."""
+    return math.ceil(load.settle_s * traffic.rate_hz / traffic.pictures_per_turn) * traffic.messages_per_turn
+
+
 def messages_needed(load: Load, traffic: Traffic) -> int:
     """Messages that one session may send in a run."""
-    seconds = load.warmup_s + load.seconds
+    ahead, seconds = messages_to_settle(load, traffic), load.warmup_s + load.seconds
     if load.loop == "open":
-        return math.ceil(seconds * traffic.rate_hz * traffic.bodies / traffic.frames_per_message) + traffic.bodies
+        turns = math.ceil(seconds * traffic.rate_hz / traffic.pictures_per_turn) + 1
+        return ahead + turns * traffic.messages_per_turn
     frames = seconds / (FASTEST_US * 1e-6) / load.sessions
-    return min(math.ceil(frames / traffic.frames_per_message) + 1, MOST_MESSAGES)
+    return ahead + min(math.ceil(frames / traffic.frames_per_message) + 1, MOST_MESSAGES)
 
 
 def conclude(load: Load, seen: Seen, used: Used | None) -> Trial:
     """A trial from what the generator saw, and the processor time used meanwhile where that is known."""
     lag_ms = Latency.of(seen.lags).p99_ms if len(seen.lags) else 0.0
     window_s = max(seen.window_s, 1e-9)
-    share, others = seen.cpu_s / window_s, None
+    share, others = seen.busy_s / window_s, None
     if used is not None:
         others = max(used.busy_s - used.server_s, 0.0) / window_s
     return Trial(
@@ -174,6 +196,7 @@ def conclude(load: Load, seen: Seen, used: Used | None) -> Trial:
         others_share=others,
         generator_share=share,
         lag_p99_ms=lag_ms,
+        window=used.window if used else None,
         unanswered=seen.unanswered,
         checkpoints=seen.checkpoints,
         failures=tuple(_failures(seen)),

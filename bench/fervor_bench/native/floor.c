@@ -1,9 +1,10 @@
 // The floor: the least that the same work can cost. One thread, epoll, the network in C, MessagePack alone.
 //
-//   floor PORT WEIGHTS EMOTION...
+//   floor PORT WEIGHTS STATES EMOTION...
 //
-// Answers `session.start` and frames as the service does, for well-behaved clients on one machine: no checks, no
-// gaps, no levels, no checkpoints, one state a body. Frames that wait together are computed together.
+// Answers `session.start` and frames as the service does, for well-behaved clients on one machine: no checks, no grid,
+// no gaps, no levels, no checkpoints. A body has one state, or the service's two. What waits together is computed
+// together.
 #define _GNU_SOURCE
 #include <errno.h>
 #include <netinet/in.h>
@@ -16,14 +17,15 @@
 
 #include "handshake.h"
 #include "network.h"
+#include "states.h"
 #include "websocket.h"
 
-enum { BODIES = 16, MOST_FRAMES = 1024, ROOM = 1 << 20 };
+enum { BODIES = 16, MOST_FRAMES = 1024, ROOM = 1 << 20, WAITING = 512 };
 
 struct client {
   int fd, emotion;
   bool upgraded;
-  struct body *bodies[BODIES];
+  struct person *bodies[BODIES];
   uint8_t *rest;
   size_t rest_size;
 };
@@ -39,8 +41,8 @@ struct waiting {
 };
 
 static struct network network;
-static struct waiting waiting[ROWS];
-static int waiting_count, epoll, emotion_count;
+static struct waiting waiting[WAITING];
+static int waiting_count, epoll, emotion_count, states;
 static char **emotion_names;
 static uint8_t buffer[ROOM], answer[MOST_FRAMES * 160];
 static size_t answer_size;
@@ -107,22 +109,48 @@ static void tell(const struct waiting *frame) {
   if (!--answer_left) send_answer(frame->client);
 }
 
-static void compute(void) {
+static struct batch {
   struct body *bodies[ROWS];
-  const float(*poses[ROWS])[4];
-  int emotions[ROWS];
-  float intensity[ROWS];
-  for (int row = 0; row < waiting_count; row++) {
-    struct waiting *frame = waiting + row;
-    bodies[row] = frame->client->bodies[frame->body];
-    poses[row] = (const float(*)[4])frame->pose;
-    emotions[row] = frame->client->emotion;
+  const float (*poses[ROWS])[4];
+  int emotions[ROWS], frames[ROWS], count;
+  float shares[ROWS], intensity[ROWS];
+} batch;
+
+// Puts one step of a frame's body into the batch: a row for each state that runs.
+static void lay_out(int frame, struct person *person) {
+  uint64_t index = person->steps++;
+  for (int state = 0; state < states && runs(index, state); state++) {
+    if (states > 1 && restarts(index, state)) memset(person->states + state, 0, sizeof *person->states);
+    int row = batch.count++;
+    batch.bodies[row] = person->states + state;
+    batch.poses[row] = (const float(*)[4])waiting[frame].pose;
+    batch.emotions[row] = waiting[frame].client->emotion;
+    batch.frames[row] = frame;
+    batch.shares[row] = states == 1 ? 1 : share(index, state);
   }
-  step(&network, bodies, poses, emotions, waiting_count, intensity);
-  for (int row = 0; row < waiting_count; row++) {
-    waiting[row].intensity = intensity[row];
-    tell(waiting + row);
+}
+
+// A body steps once a batch, so several of its frames take as many rounds.
+static void compute(void) {
+  static int round;
+  static bool done[WAITING];
+  memset(done, 0, waiting_count);
+  for (int left = waiting_count; left;) {
+    round++;
+    batch.count = 0;
+    for (int i = 0; i < waiting_count && batch.count + states <= ROWS; i++) {
+      struct person *person = waiting[i].client->bodies[waiting[i].body];
+      if (done[i] || person->round == round) continue;
+      person->round = round;
+      done[i] = true;
+      left--;
+      lay_out(i, person);
+    }
+    step(&network, batch.bodies, batch.poses, batch.emotions, batch.count, batch.intensity);
+    for (int row = 0; row < batch.count; row++)
+      waiting[batch.frames[row]].intensity += batch.shares[row] * batch.intensity[row];
   }
+  for (int i = 0; i < waiting_count; i++) tell(waiting + i);
   waiting_count = 0;
 }
 
@@ -133,19 +161,14 @@ static const uint8_t *value_of(const uint8_t *at, const uint8_t *end, const char
 }
 
 static void queue(struct client *client, uint64_t seq, int body, double time, const uint8_t *pose, int of) {
-  for (int row = 0; row < waiting_count; row++)
-    if (waiting[row].client == client && waiting[row].body == body) {  // a body steps once a batch
-      compute();
-      break;
-    }
   if (!client->bodies[body]) {
-    client->bodies[body] = calloc(1, sizeof(struct body));
+    client->bodies[body] = calloc(1, sizeof(struct person));
     if (!client->bodies[body]) die("memory");
   }
   struct waiting *frame = waiting + waiting_count++;
   *frame = (struct waiting){.client = client, .body = body, .seq = seq, .time = time, .of = of};
   memcpy(frame->pose, pose, sizeof frame->pose);
-  if (waiting_count == ROWS) compute();
+  if (waiting_count == WAITING) compute();
 }
 
 // Frames as script.py lays them out: body, seq, t, q, in this order.
@@ -264,13 +287,14 @@ static int listen_at(int port) {
 }
 
 int main(int count, char **words) {
-  if (count < 3) {
-    fputs("floor PORT WEIGHTS EMOTION...\n", stderr);
+  states = count < 4 ? 0 : atoi(words[3]);
+  if (states < 1 || states > MOST_STATES) {
+    fputs("floor PORT WEIGHTS STATES EMOTION...\n", stderr);
     return 64;
   }
   struct weights *weights = read_weights(words[2]);
-  emotion_names = words + 3;
-  emotion_count = count - 3;
+  emotion_names = words + 4;
+  emotion_count = count - 4;
   network = (struct network){weights, tile(weights->lstm1[0], INPUT1, 4 * HIDDEN1),
                              tile(weights->lstm2[0], INPUT2, 4 * HIDDEN2)};
   struct rlimit files;

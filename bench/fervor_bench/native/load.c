@@ -1,14 +1,18 @@
 // Load generator: many WebSocket sessions from one thread, at their own pace (open loop) or as fast as they are
 // answered (closed loop).
 //
-//   load HOST PORT SCRIPT RESULT SESSIONS open|closed random|lockstep WARMUP_S SECONDS
+//   load HOST PORT SCRIPT RESULT SESSIONS open|closed random|lockstep spin|sleep SETTLE WARMUP_S SECONDS
 //
-// SCRIPT holds all bytes to send, masked and framed (script.py writes it). On standard output: "ready" once all
+// SCRIPT holds all bytes to send, masked and framed (traffic.py writes it). On standard output: "ready" once all
 // sessions are started, then it waits for a line on standard input; "begin" and "end" around the measured window;
 // last, one JSON object. RESULT gets the latencies and the lags, float32 microseconds.
 //
+// First every session sends SETTLE messages as fast as they are answered, so that it is measured as it is later on.
 // Open loop: latency counts from the moment when a message was due, whenever it could be sent (no coordinated
 // omission); `lag` is how late the generator itself was. Closed loop: latency counts from the send.
+//
+// `spin`: between messages it polls, since a processor that sleeps wakes up late; its busy time then is that of the
+// rounds in which something was sent or came. `sleep`: where it shares its processor, its busy time is processor time.
 #define _GNU_SOURCE
 #include <sys/resource.h>
 #include <sys/timerfd.h>
@@ -20,10 +24,12 @@ static const double GRACE_S = 2.0, START_S = 60.0;
 
 static struct session *sessions;
 static int session_count, timer;
+static bool spin, told;  // told: standard input said something
 
-// Handles what happens until `until`, or what is there already for 0. Returns whether standard input said something.
+// Handles what happens until `until`, or what is there already for 0 and while spinning. Returns whether something did.
 static bool turn(double until) {
   static double armed;
+  if (spin) until = 0;
   if (until > 0 && until != armed) {
     struct itimerspec at = {.it_value = {.tv_sec = until, .tv_nsec = (until - (time_t)until) * 1e9}};
     if (timerfd_settime(timer, TFD_TIMER_ABSTIME, &at, NULL)) die("timerfd");
@@ -31,18 +37,17 @@ static bool turn(double until) {
   }
   struct epoll_event events[256];
   int count = epoll_wait(epoll, events, 256, until > 0 ? -1 : 0);
-  bool spoken = false;
   for (int i = 0; i < count; i++) {
     uint64_t ticks;
     if (events[i].data.ptr == &timer) {
       if (read(timer, &ticks, sizeof ticks) > 0) armed = 0;
     } else if (events[i].data.ptr == NULL) {
-      spoken = true;
+      told = true;
     } else {
       on_event(events[i].data.ptr, events[i].events);
     }
   }
-  return spoken;
+  return count > 0;
 }
 
 static void dial_all(const struct addrinfo *to) {
@@ -91,7 +96,7 @@ static double send_due(uint64_t *tick, int *place) {
     double due = start_s + session->offset_s + *tick * interval_s;
     if (due > now_s()) return due;
     if (due >= end_s) return 1e18;
-    session->allowed = (*tick + 1) * group;
+    session->allowed = settle + (*tick + 1) * group;
     if (!session->blocked) flush(session);
     if (++*place == session_count) {
       *place = 0;
@@ -101,7 +106,18 @@ static double send_due(uint64_t *tick, int *place) {
   return 0;
 }
 
-// Returns the processor time, seconds, that the window took.
+// Closed loop, and before an open one: the first message of every session, then more as they are answered.
+static void set_off(void) {
+  if (open_loop && !settle) return;
+  for (int i = 0; i < session_count; i++) {
+    sessions[i].allowed = 1;
+    flush(sessions + i);
+  }
+  double give_up = now_s() + START_S;
+  while (settle && tally.settled < tally.live && now_s() < give_up) turn(now_s() + 0.1);
+}
+
+// Returns the seconds of the window in which it was busy.
 static double run(double warmup_s, double seconds) {
   start_s = now_s() + 0.05;
   begin_s = start_s + warmup_s;
@@ -109,28 +125,27 @@ static double run(double warmup_s, double seconds) {
   uint64_t tick = 0;
   int place = 0;
   bool begun = false;
-  double used = 0, now;
-  if (!open_loop)
-    for (int i = 0; i < session_count; i++) {
-      sessions[i].allowed = 1;
-      flush(sessions + i);
-    }
-  while ((now = now_s()) < end_s && tally.live && !(tally.dry && !open_loop)) {
+  double used = 0, busy = 0, now = now_s();
+  while (now < end_s && tally.live && !(tally.dry && !open_loop)) {
     if (!begun && now >= begin_s) {
       begun = true;
-      used = cpu_s();
+      used = cpu_s(), busy = 0;
       say("begin");
     }
+    uint64_t sent = tally.sent;
     double next = open_loop ? send_due(&tick, &place) : 1e18;
-    double edge = begun ? end_s : begin_s;
-    turn(next < edge ? next : edge);
+    double edge = begun ? end_s : begin_s, before = now;
+    bool moved = turn(next < edge ? next : edge);
+    now = now_s();
+    if (moved || tally.sent > sent) busy += now - before;
   }
-  used = cpu_s() - used;
+  if (!spin) busy = cpu_s() - used;
+  spin = false;
   say("end");
   if (now < end_s) end_s = now;  // the script or the sessions came to an end
   while (open_loop && send_due(&tick, &place) == 0) turn(0);  // what was due just before the end, and is late
   while (tally.answered < tally.sent && tally.live && now_s() < now + GRACE_S) turn(now_s() + 0.05);
-  return used;
+  return busy;
 }
 
 // --- results ---------------------------------------------------------------------------------------------------------
@@ -147,14 +162,14 @@ static void write_result(const char *path) {
 static uint64_t count_unanswered(void) {
   uint64_t due = 0;
   for (int i = 0; open_loop && i < session_count; i++)
-    for (uint64_t m = 0; m < script.messages && due_s(sessions + i, m) < end_s; m++)
+    for (uint64_t m = settle; m < script.messages && due_s(sessions + i, m) < end_s; m++)
       due += due_s(sessions + i, m) >= begin_s ? script.frames : 0;
   return open_loop ? due - tally.counted : 0;
 }
 
 int main(int count, char **words) {
-  if (count != 10) {
-    fputs("load HOST PORT SCRIPT RESULT SESSIONS open|closed random|lockstep WARMUP_S SECONDS\n", stderr);
+  if (count != 12) {
+    fputs("load HOST PORT SCRIPT RESULT SESSIONS open|closed random|lockstep spin|sleep SETTLE WARMUP_S SECONDS\n", stderr);
     return 64;
   }
   script = read_script(words[3]);
@@ -162,6 +177,7 @@ int main(int count, char **words) {
   session_count = atoi(words[5]);
   sessions = calloc(session_count, sizeof *sessions);
   open_loop = !strcmp(words[6], "open");
+  settle = strtoull(words[9], NULL, 10);
   begin_s = end_s = 1e18;
   struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *to;
   if (getaddrinfo(words[1], words[2], &hints, &to)) die(words[1]);
@@ -179,17 +195,18 @@ int main(int count, char **words) {
   dial_all(to);
   printf("ready %d %d %s\n", tally.live, tally.refused, tally.first_error);
   fflush(stdout);
-  while (!turn(now_s() + 1.0)) {
-  }
+  while (!told) turn(now_s() + 1.0);
   char word[16];
   if (read(STDIN_FILENO, word, sizeof word) <= 0) return 0;  // whoever started this is gone
   epoll_ctl(epoll, EPOLL_CTL_DEL, STDIN_FILENO, NULL);
-  double used = run(atof(words[8]), atof(words[9]));
+  spin = !strcmp(words[8], "spin");
+  set_off();
+  double busy = run(atof(words[10]), atof(words[11]));
   write_result(words[4]);
   printf("{\"sessions\": %d, \"refused\": %d, \"closed\": %d, \"errors\": %lu, \"first_error\": \"%s\", "
          "\"frames\": %lu, \"unanswered\": %lu, \"checkpoints\": %lu, \"blocked\": %lu, \"dry\": %s, "
-         "\"window_s\": %.6f, \"cpu_s\": %.6f}\n",
+         "\"window_s\": %.6f, \"busy_s\": %.6f}\n",
          tally.live, tally.refused, tally.closed, tally.errors, tally.first_error, tally.in_window, count_unanswered(),
-         tally.checkpoints, tally.blocked, tally.dry ? "true" : "false", end_s - begin_s, used);
+         tally.checkpoints, tally.blocked, tally.dry ? "true" : "false", end_s - begin_s, busy);
   return 0;
 }

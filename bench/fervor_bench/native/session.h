@@ -25,8 +25,8 @@ struct session {
   double offset_s;            // of its schedule
   uint64_t next, allowed;     // messages: the next to send, and how many may be sent by now
   size_t written;             // bytes of the next message
-  uint32_t unanswered;        // frames of the message under way, closed loop
-  double sent_at;             // closed loop
+  uint32_t unanswered;        // frames of the newest message
+  double sent_at;             // of the newest message
   bool blocked;
   uint8_t *rest;              // of a frame that is not all there
   size_t rest_size;
@@ -37,10 +37,11 @@ static int epoll;
 static bool open_loop, json;
 static double start_s, begin_s, end_s, interval_s;
 static uint32_t group;  // messages of a session that are due together
+static uint64_t settle;  // messages of a session that go ahead of its schedule, each when the one before is answered
 static struct series latencies, lags;
 static struct {
   uint64_t sent, answered, in_window, counted, checkpoints, errors, blocked;
-  int live, refused, closed;
+  int live, refused, closed, settled;
   bool dry;
   char first_error[256];
 } tally;
@@ -54,8 +55,10 @@ static void note_error(const uint8_t *text, size_t length) {
   }
 }
 
+static bool scheduled(uint64_t message) { return open_loop && message >= settle; }
+
 static double due_s(const struct session *session, uint64_t message) {
-  return start_s + session->offset_s + message / group * interval_s;
+  return start_s + session->offset_s + (message - settle) / group * interval_s;
 }
 
 static void watch(struct session *session, uint32_t events, int how) {
@@ -85,7 +88,7 @@ static void flush(struct session *session) {
     }
     const uint64_t *at = script.offsets + session->variant * script.messages + session->next;
     double now = now_s();
-    if (!session->written && !session->blocked && open_loop) {
+    if (!session->written && !session->blocked && scheduled(session->next)) {
       double due = due_s(session, session->next);
       if (due >= begin_s && due < end_s) add(&lags, now - due);
     }
@@ -128,16 +131,18 @@ static void on_answer(struct session *session, uint64_t seq, double now) {
   }
   tally.answered++;
   tally.in_window += now >= begin_s && now < end_s;
-  double from = open_loop ? due_s(session, message) : session->sent_at;
-  double at = open_loop ? from : now;
+  bool due = scheduled(message);
+  double from = due ? due_s(session, message) : session->sent_at;
+  double at = due ? from : now;
   if (at >= begin_s && at < end_s) {
     add(&latencies, now - from);
     tally.counted++;
   }
-  if (!open_loop && session->unanswered && !--session->unanswered && now < end_s) {
-    session->allowed++;
-    flush(session);
-  }
+  if (due || message + 1 != session->next || !session->unanswered || --session->unanswered) return;
+  tally.settled += session->next == settle;
+  if ((open_loop && session->next >= settle) || now >= end_s) return;
+  session->allowed++;
+  flush(session);
 }
 
 static void on_seqs(struct session *session, const uint8_t *at, const uint8_t *end, double now) {
