@@ -36,3 +36,22 @@ def test_one_failure_of_two_is_forgiven() -> None:
 def test_a_failure_that_proves_nothing_bounds_nothing() -> None:
     found = find_capacity(lambda n: Verdict(keeps=n <= 100, valid=n <= 100), first=64, most=1000, resolution=0.0)
     assert found == Capacity(100, bounded=False)
+
+
+def test_the_long_trial_has_the_last_word() -> None:
+    asked: list[int] = []
+
+    def confirm(sessions: int) -> Verdict:
+        asked.append(sessions)
+        return Verdict(keeps=sessions <= 80, valid=True)
+
+    found = find_capacity(lambda n: Verdict(n <= 100, valid=True), first=64, most=1000, attempts=1, confirm=confirm)
+    assert 76 <= found.sessions <= 80
+    assert found.bounded
+    assert asked == sorted(asked, reverse=True)
+    assert asked[-1] == found.sessions
+
+
+def test_nothing_is_kept_where_nothing_is_confirmed() -> None:
+    never = Verdict(keeps=False, valid=True)
+    assert find_capacity(lambda _: Verdict(True, valid=True), first=4, most=8, confirm=lambda _: never).sessions == 0

@@ -24,29 +24,49 @@ PLAIN = Traffic(checkpoints=False)
 
 def test_estimates_of_another_model_are_refused() -> None:
     with speaking.speaking() as running, pytest.raises(BenchError, match="estimates differ from the model's by 0"):
-        check_estimates(running, PLAIN)
+        check_estimates(running, PLAIN, grid=True, states=2)
 
 
 @pytest.mark.parametrize("encoding", ["json", "msgpack"])
-def test_the_service_passes(live, encoding) -> None:
+@pytest.mark.parametrize("jitter_s", [0.0, 0.004, 0.012])
+def test_the_service_passes(live, encoding, jitter_s: float) -> None:
     host, port = live.address.split(":")
-    assert check_estimates(Running(host, int(port)), replace(PLAIN, encoding=encoding)) < 1e-5
+    traffic = replace(PLAIN, encoding=encoding, jitter_s=jitter_s)
+    assert check_estimates(Running(host, int(port)), traffic, grid=True, states=2) < 1e-5
 
 
-@pytest.mark.parametrize("name", ["naive", "naive-tuned", "floor"])
+@pytest.mark.parametrize("name", ["naive", "naive-tuned", "floor", "floor-two"])
 @pytest.mark.parametrize("emotion", ["joy", "sadness", "unknown"])
 def test_others_compute_what_the_model_does(workshop: Path, name: str, emotion: str) -> None:
     contestant = CONTESTANTS[name]
     traffic = replace(PLAIN, encoding=contestant.encodings[0], emotion=emotion)
     with started(contestant, workshop, choose_places().server) as running:
-        assert check_estimates(running, traffic) < 1e-4
+        assert check_estimates(running, traffic, grid=False, states=contestant.states) < 1e-4
         assert running.start_s is not None
 
 
-@pytest.mark.parametrize("frames", [4, 20])
-def test_the_floor_takes_several_frames_a_message(workshop: Path, frames: int) -> None:
-    with started(CONTESTANTS["floor"], workshop, choose_places().server) as running:
-        assert check_estimates(running, replace(PLAIN, frames_per_message=frames)) < 1e-4
+@pytest.mark.parametrize("frames", [6, 20])
+@pytest.mark.parametrize(("name", "states"), [("floor", 1), ("floor-two", 2)])
+def test_the_floor_takes_several_frames_a_message(workshop: Path, name: str, states: int, frames: int) -> None:
+    traffic = replace(PLAIN, frames_per_message=frames)
+    with started(CONTESTANTS[name], workshop, choose_places().server) as running:
+        assert check_estimates(running, traffic, grid=False, states=states) < 1e-4
+
+
+def test_who_keeps_one_state_is_not_taken_for_two(workshop: Path) -> None:
+    with (
+        started(CONTESTANTS["floor"], workshop, choose_places().server) as running,
+        pytest.raises(BenchError, match="estimates differ"),
+    ):
+        check_estimates(running, PLAIN, grid=False, states=2)
+
+
+def test_who_knows_no_grid_is_not_taken_for_one_who_does(workshop: Path) -> None:
+    with (
+        started(CONTESTANTS["floor-two"], workshop, choose_places().server) as running,
+        pytest.raises(BenchError, match="estimates differ"),
+    ):
+        check_estimates(running, replace(PLAIN, jitter_s=0.012), grid=True, states=2)
 
 
 def test_the_floor_follows_several_bodies(workshop: Path) -> None:

@@ -47,6 +47,36 @@ def test_every_frame_that_was_due_is_answered_and_matched(track, encoding, bodie
     assert sent.count(0) == 3
 
 
+@pytest.mark.parametrize("encoding", ["json", "msgpack"])
+@pytest.mark.parametrize(("bodies", "frames"), [(1, 1), (1, 6), (4, 1)])
+@pytest.mark.parametrize("waits", ["spin", "sleep"])
+def test_what_goes_ahead_is_answered_and_not_measured(track, encoding, bodies: int, frames: int, waits) -> None:
+    load = replace(SHORT, settle_s=2.0, waits=waits)
+    with speaking.speaking() as running:
+        trial = track(encoding=encoding, bodies=bodies, frames_per_message=frames).run(running, load)
+    assert trial.unanswered == 0
+    assert trial.failures == ()
+    # In the window as many as are due in it, though all that went ahead came much faster.
+    assert trial.frames_per_second <= 3 * 30 * bodies * 1.5
+    assert 0 < trial.latency.p50_ms < float("inf")
+
+
+@pytest.mark.parametrize("loop", ["open", "closed"])
+def test_what_goes_ahead_comes_first_and_only_once(track, loop) -> None:
+    asked: list[int] = []
+
+    def answer(message: dict) -> list[dict]:
+        if "seq" in message:
+            asked.append(message["seq"])
+        return speaking.answer(message)
+
+    with speaking.speaking(answer) as running:
+        trial = track().run(running, Load(1, loop, warmup_s=0.1, seconds=0.3, settle_s=1.0, waits="spin"))
+    assert asked == list(range(len(asked)))
+    assert len(asked) > 30
+    assert trial.unanswered == 0
+
+
 def test_a_closed_loop_has_one_message_of_a_session_under_way(track) -> None:
     open_now = {"now": 0, "most": 0}
     lock = threading.Lock()
@@ -129,6 +159,7 @@ def test_a_generator_that_was_held_up_says_so(workshop) -> None:
             script,
             address=(running.host, running.port),
             load=load,
+            settle=0,
             processor=min(os.sched_getaffinity(0)),
             result=workshop / "held-result",
         ) as generator:

@@ -21,12 +21,15 @@ from program import fervor
 TINY = Plan(
     contestants=("naive-tuned", "fervor", "floor"),
     encoding="msgpack",
-    sessions=(1, 3),
+    frames=(1,),
+    sessions=(2, 3),
     seconds=0.4,
+    lone_s=0.4,
     saturated=2,
     idle=4,
     most_sessions=2,
     attempts=1,
+    confirm_s=0.5,
 )
 
 
@@ -49,14 +52,29 @@ def test_service_and_floor_are_measured_side_by_side(workshop: Path, tmp_path: P
         assert standing.idle_kib is not None
         assert standing.saturated is not None
         assert standing.saturated.frames_per_second > 0
-        assert [trial.load.sessions for trial in standing.trials] == [1, 3]
+        assert [trial.load.sessions for trial in standing.trials] == [2, 3]
+        assert standing.lone is not None
+        assert standing.lone.awake is not None
+        assert standing.capacity is not None
+        assert (standing.confirmed is None) == (standing.capacity.sessions == 0)
         assert all(not trial.failures for trial in standing.trials)
+    service, floor = results.standings
+    assert service.pauses is not None
+    assert floor.pauses is None  # it has no collector
     text = shown(results)
-    for word in ("fervor, msgpack", "floor, msgpack", "x naive", "of floor", "most sessions"):
+    for word in (
+        "fervor, msgpack",
+        "floor, msgpack",
+        "x naive",
+        "of floor",
+        "most sessions",
+        "a lone session",
+        "pauses",
+    ):
         assert word in text
     results.write(tmp_path / "results.json")
     written = json.loads((tmp_path / "results.json").read_text())
-    assert written["plan"]["sessions"] == [1, 3]
+    assert written["plan"]["sessions"] == [2, 3]
     assert written["standings"][1]["contestant"] == "floor"
     plot(results, tmp_path / "plot.png")
     assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
@@ -64,11 +82,13 @@ def test_service_and_floor_are_measured_side_by_side(workshop: Path, tmp_path: P
 
 @pytest.mark.slow
 def test_stages_and_scoring_are_measured_too(workshop: Path) -> None:
-    plan = replace(TINY, contestants=("fervor",), seconds=1.0, sessions=(1,), idle=0, most_sessions=0)
+    plan = replace(TINY, contestants=("fervor",), seconds=1.0, sessions=(), lone_s=0, idle=0, most_sessions=0)
     results = measure_all(plan, stages=True, scoring=True, told=quiet)
     (breakdown,) = results.breakdowns
     assert sum(stage.share for stage in breakdown.stages) == pytest.approx(1.0)
-    assert {"engine", "model"} <= {stage.name for stage in breakdown.stages}
+    found = {stage.name: stage.share for stage in breakdown.stages}
+    assert {"engine", "model", "session", "conversation"} <= set(found)
+    assert [cost.bodies for cost in results.insides] == [1, 8, 64, 256, 64]
     assert results.beside is not None
     text = shown(results)
     assert "stages of a frame" in text
@@ -98,7 +118,14 @@ def test_who_can_not_run_here_costs_no_other_its_place(workshop: Path, monkeypat
 
     monkeypatch.setattr("fervor_bench.weights.write_weights", refuse)
     plan = Plan(
-        contestants=("fervor", "floor"), encoding="msgpack", sessions=(1,), seconds=0.3, idle=0, most_sessions=0
+        contestants=("fervor", "floor"),
+        encoding="msgpack",
+        frames=(1,),
+        sessions=(1,),
+        seconds=0.3,
+        lone_s=0,
+        idle=0,
+        most_sessions=0,
     )
     results = measure_all(plan, stages=False, scoring=False, told=quiet)
     assert [standing.contestant for standing in results.standings] == ["fervor"]
@@ -118,14 +145,33 @@ def test_a_contestant_that_is_not_known_is_refused() -> None:
 
 
 def test_a_simple_contestant_takes_simple_traffic() -> None:
-    with pytest.raises(BenchError, match="naive takes 13 joints and one frame a message"):
-        Plan(contestants=("naive",), traffic=Traffic(joints=25)).entries()
-    both = Plan(contestants=("fervor", "floor"), encoding="msgpack", traffic=Traffic(frames_per_message=4)).entries()
-    assert [traffic.checkpoints for _, traffic in both] == [True, False]
+    for plan in (Plan(contestants=("naive",), traffic=Traffic(joints=25)), Plan(contestants=("naive",), frames=(4,))):
+        with pytest.raises(BenchError, match="naive takes 13 joints and one frame a message"):
+            plan.entries()
+    entries = Plan(contestants=("naive", "fervor", "floor")).entries()
+    assert [
+        (contestant.name, traffic.encoding, traffic.frames_per_message, traffic.checkpoints)
+        for contestant, traffic in entries
+    ] == [
+        ("naive", "json", 1, False),
+        ("fervor", "json", 1, True),
+        ("fervor", "json", 6, True),
+        ("fervor", "msgpack", 1, True),
+        ("fervor", "msgpack", 6, True),
+        ("floor", "msgpack", 1, False),
+        ("floor", "msgpack", 6, False),
+    ]
 
 
 def test_the_quick_plan_has_service_naive_and_floor() -> None:
     assert {contestant.name for contestant, _ in QUICK.entries()} == {"naive-tuned", "fervor", "floor"}
+
+
+def test_whoever_keeps_two_states_is_measured_with_both() -> None:
+    plan = Plan()
+    assert plan.load(5, settled=False).settle_s > 4.0  # the second state begins
+    assert plan.filled(5, settled=False).settle_s > 4.0
+    assert plan.load(5, settled=True).settle_s == 0.0
 
 
 @pytest.mark.parametrize("url", ["wss://robot.local", "robot.local:80", "ws://", "ws://robot.local:port"])
@@ -150,15 +196,17 @@ def test_one_processor_is_not_enough(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_command_prints_and_writes(workshop: Path, tmp_path: Path) -> None:
     out = tmp_path / "results"
     said = fervor(
-        *("bench", "--contestants", "floor", "--sessions", "2", "--seconds", "0.3"),
-        *("--idle", "0", "--most-sessions", "0", "--out", out),
+        *("bench", "--contestants", "floor", "--sessions", "2", "--seconds", "0.3", "--frames", "1,6"),
+        *("--lone", "0", "--idle", "0", "--most-sessions", "0", "--out", out),
     )
     assert said.returncode == 0, said.stderr
     assert "floor, msgpack" in said.stdout
-    assert {path.name for path in out.iterdir()} == {"results.json", "plot.png"}
+    assert {path.name for path in out.iterdir()} == {"results.md", "results.json", "plot.png"}
+    assert "| floor, msgpack, 6 frames a message |" in (out / "results.md").read_text()
 
 
 def test_numbers_that_are_none_are_refused() -> None:
-    said = fervor("bench", "--sessions", "1,many")
-    assert said.returncode == 2
-    assert "expected numbers from 1 to 20000" in said.stderr
+    for option, most in (("--sessions", 20000), ("--frames", 1024)):
+        said = fervor("bench", option, "1,many")
+        assert said.returncode == 2
+        assert f"expected numbers from 1 to {most}" in said.stderr

@@ -45,7 +45,7 @@ def test_lengths_are_written_in_their_three_ways(size: int) -> None:
 @pytest.mark.parametrize("encoding", ["json", "msgpack"])
 @pytest.mark.parametrize("joints", [13, 25])
 def test_messages_are_frames_of_the_protocol(encoding, joints: int) -> None:
-    traffic = Traffic(encoding=encoding, joints=joints, bodies=2)
+    traffic = Traffic(encoding=encoding, joints=joints, bodies=2, jitter_s=0)
     start = decode(traffic, traffic.encode(traffic.start()))
     assert isinstance(start, SessionStart)
     assert start.checkpoint_s == 1.0
@@ -54,6 +54,37 @@ def test_messages_are_frames_of_the_protocol(encoding, joints: int) -> None:
     assert [frame.seq for frame in frames] == list(range(len(frames)))
     assert [frame.body for frame in frames[:4]] == ["0", "1", "0", "1"]
     assert [frame.t for frame in frames[::2]] == pytest.approx([step / 30 for step in range(CYCLE + 2)], abs=1e-6)
+
+
+@pytest.mark.parametrize("encoding", ["json", "msgpack"])
+def test_times_are_a_sensors(encoding) -> None:
+    traffic = Traffic(encoding=encoding, bodies=2)
+    times = [decode(traffic, payload).t for payload in traffic.payloads(3, 600)]
+    assert times[::2] == times[1::2] == traffic.times(3, 300).tolist()
+    off = np.array(times[::2]) - np.arange(300) / 30  # from an even clock that began at any time
+    assert 0.0075 < np.ptp(off) <= 0.008
+    assert (np.diff(times[::2]) > 0).all()
+
+
+def test_frames_off_the_grid_bring_no_step_of_it_one_or_two() -> None:
+    brought: set[int] = set()
+    for variant in range(8):
+        times = Traffic().times(variant, 300)
+        newest = np.floor((times - times[0]) * 30 + 1e-6)
+        brought |= set(np.diff(newest).astype(int).tolist())
+    assert brought == {0, 1, 2}
+
+
+def test_sensors_begin_at_their_own_time_and_go_on_as_they_began() -> None:
+    traffic = Traffic()
+    assert len({float(traffic.times(variant, 1)[0]) for variant in range(32)}) == 32
+    assert traffic.times(5, 10).tolist() == traffic.times(5, 200)[:10].tolist()
+
+
+@pytest.mark.parametrize("jitter_s", [-0.001, 0.02, float("nan")])
+def test_times_that_might_not_rise_are_refused(jitter_s: float) -> None:
+    with pytest.raises(BenchError, match="expected 0 or more, and less than 16"):
+        Traffic(jitter_s=jitter_s)
 
 
 def test_both_encodings_carry_the_same_motion() -> None:

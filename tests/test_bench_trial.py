@@ -1,11 +1,15 @@
 """What makes a trial count."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fervor_bench.generator import Load, Seen
 from fervor_bench.traffic import Traffic
-from fervor_bench.trial import MOST_MESSAGES, Used, conclude, messages_needed
+from fervor_bench.trial import MOST_MESSAGES, Used, conclude, messages_needed, messages_to_settle
+
+WINDOW = (10.0, 12.0)
 
 
 def seen(**changes) -> Seen:
@@ -21,7 +25,7 @@ def seen(**changes) -> Seen:
         "blocked": 0,
         "dry": False,
         "window_s": 2.0,
-        "cpu_s": 0.2,
+        "busy_s": 0.2,
         "latencies": np.full(1000, 500, np.float32),
         "lags": np.full(1000, 20, np.float32),
     }
@@ -29,9 +33,10 @@ def seen(**changes) -> Seen:
 
 
 def test_costs_are_processor_time_by_frames() -> None:
-    trial = conclude(Load(10), seen(), Used(server_s=0.5, busy_s=0.6))
+    trial = conclude(Load(10), seen(), Used(0.5, 0.6, WINDOW))
     assert (trial.server_us, trial.server_share, trial.frames_per_second) == (500.0, 0.25, 500.0)
     assert trial.others_share == pytest.approx(0.05)
+    assert trial.window == WINDOW
     assert trial.valid
     assert trial.keeps(10.0)
     assert not trial.keeps(0.5)
@@ -39,16 +44,16 @@ def test_costs_are_processor_time_by_frames() -> None:
 
 def test_a_service_elsewhere_has_no_costs() -> None:
     trial = conclude(Load(10), seen(), None)
-    assert trial.server_us is trial.server_share is trial.others_share is None
+    assert trial.server_us is trial.server_share is trial.others_share is trial.window is None
 
 
 @pytest.mark.parametrize(
     ("load", "changes", "used", "objection"),
     [
-        (Load(10), {"lags": np.full(1000, 1500, np.float32)}, Used(1.0, 1.0), "lagged"),
-        (Load(10), {"cpu_s": 1.96}, Used(1.0, 1.0), "98% of its processor"),
-        (Load(10), {}, Used(1.0, 1.5), "others used 25% of the contestant's processor"),
-        (Load(10, arrivals="lockstep"), {"lags": np.full(1000, 11000, np.float32)}, Used(1.0, 1.0), "lagged"),
+        (Load(10), {"lags": np.full(1000, 1500, np.float32)}, Used(1.0, 1.0, WINDOW), "lagged"),
+        (Load(10), {"busy_s": 1.96}, Used(1.0, 1.0, WINDOW), "98% of its processor"),
+        (Load(10), {}, Used(1.0, 1.5, WINDOW), "others used 25% of the contestant's processor"),
+        (Load(10, arrivals="lockstep"), {"lags": np.full(1000, 11000, np.float32)}, Used(1.0, 1.0, WINDOW), "lagged"),
     ],
 )
 def test_what_the_contestant_is_not_to_blame_for_is_objected_to(load, changes, used, objection) -> None:
@@ -59,7 +64,7 @@ def test_what_the_contestant_is_not_to_blame_for_is_objected_to(load, changes, u
 
 def test_lockstep_and_closed_loops_are_judged_by_their_own_measure() -> None:
     assert conclude(Load(10, arrivals="lockstep"), seen(lags=np.full(1000, 1500, np.float32)), None).valid
-    assert conclude(Load(10, loop="closed"), seen(cpu_s=1.99, lags=np.zeros(0, np.float32)), None).valid
+    assert conclude(Load(10, loop="closed"), seen(busy_s=1.99, lags=np.zeros(0, np.float32)), None).valid
 
 
 @pytest.mark.parametrize("changes", [{"refused": 1}, {"closed": 1}, {"errors": 1}, {"frames": 0}])
@@ -72,3 +77,12 @@ def test_messages_last_for_the_whole_run() -> None:
     assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic(frames_per_message=6)) == 31
     assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic(bodies=4)) == 6 * 30 * 4 + 4
     assert messages_needed(Load(1, loop="closed"), Traffic()) == MOST_MESSAGES
+
+
+@pytest.mark.parametrize(
+    ("bodies", "frames", "messages"), [(1, 1, 60), (1, 6, 10), (4, 1, 240), (4, 2, 120), (2, 4, 30)]
+)
+def test_what_goes_ahead_is_so_many_seconds_of_every_body(bodies: int, frames: int, messages: int) -> None:
+    load, traffic = Load(3, warmup_s=1, seconds=5, settle_s=2), Traffic(bodies=bodies, frames_per_message=frames)
+    assert messages_to_settle(load, traffic) == messages
+    assert messages_needed(load, traffic) == messages + messages_needed(replace(load, settle_s=0), traffic)
