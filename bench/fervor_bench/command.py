@@ -28,7 +28,12 @@ def bench(
     ] = "random",
     joints: Annotated[int, typer.Option(min=1, help="Joints of a pose: picks a skeleton.")] = 13,
     bodies: Annotated[int, typer.Option(min=1, max=16, help="Bodies in a session.")] = 1,
-    frames: Annotated[str, typer.Option(help="Frames in a message, by commas: each is tried.")] = "1,6",
+    frames: Annotated[
+        str | None,
+        typer.Option(
+            help="Frames in a message, by commas: each is tried. 1,6, or 1 with several bodies.", show_default=False
+        ),
+    ] = None,
     jitter: Annotated[
         float, typer.Option(min=0, max=16, help="How far a frame's time may be off, ms; 0: exactly on the grid.")
     ] = 4.0,
@@ -60,7 +65,7 @@ def bench(
             contestants=tuple(name.strip() for name in contestants.split(",")),
             encoding=encoding,
             traffic=Traffic(joints=joints, bodies=bodies, jitter_s=jitter / 1000.0, checkpoints=checkpoints),
-            frames=_numbers(frames, "--frames", most=1024) or (1,),
+            frames=_numbers(frames or ("1,6" if bodies == 1 else "1"), "--frames", most=1024) or (1,),
             sessions=_numbers(sessions, "--sessions", most=20_000),
             loop=loop,
             arrivals=arrivals,
