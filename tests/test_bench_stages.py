@@ -68,7 +68,7 @@ def test_a_live_sample_has_the_services_stages(workshop: Path) -> None:
     found = read_stacks(stacks)
     assert sum(found.values()) > 100
     ours = re.compile(
-        r"\(fervor/(protocol/(?!trusted|messages|estimate)|session|engine|skeletons|rotations|model|levels)"
+        r"\(fervor/(protocol/(?!\w*(trusted|messages|estimate))|session|engine|skeletons|rotations|model|levels)"
     )
     for stack in found:
         innermost = next((frame for frame in reversed(stack.split(";")) if "(fervor/" in frame), "")

@@ -15,13 +15,14 @@ import numpy.typing as npt
 from rich.table import Table
 
 from fervor.engine.engine import Engine
+from fervor.errors import EngineError
 from fervor.model import Floats, Model, Outputs, default_model_path
 from fervor.protocol.codec import CODECS, Codec
 from fervor.protocol.messages import Frame, Limits, ModelInfo, SessionStart
 from fervor.protocol.raw_frame import RawFrame
-from fervor.session.events import Reply, Ticket
+from fervor.session.events import Outcome, Reply, Said, Ticket
 from fervor.session.host import Host
-from fervor.session.poses import read_poses
+from fervor.session.poses import Read, read_poses
 from fervor.session.session import Session
 from fervor.skeletons.adapter import adapt
 from fervor.skeletons.catalog import SKELETONS, skeleton
@@ -42,6 +43,9 @@ AHEAD = 130
 
 FRAMES, ROUNDS = 60, 5
 """Of each crowd; the best round of each stage counts, the one that the machine disturbed least."""
+
+Conclude = Callable[[Ticket, Outcome | EngineError], Sequence[Said]]
+"""From the outcome of a ticket to what is said of it."""
 
 STAGES = ("decode", "plan", "engine", "model", "conclude", "encode")
 
@@ -146,24 +150,31 @@ class _Crowd:
             frames = [_frame(decode_raw(each) or decode(each)) for each in came]
             poses = read_poses(list(zip(self._agreements, frames, strict=True)))
         with self.watch.on("plan"):
-            tickets = [
-                event
-                for session, frame, pose in zip(self._sessions, frames, poses, strict=True)
-                for event in session.receive(frame, [pose])
-                if isinstance(event, Ticket)
-            ]
+            planned = [_plan(*each) for each in zip(self._sessions, frames, poses, strict=True)]
         with self.watch.on("engine"):
-            outcomes = self._engine.run(tickets)
+            outcomes = self._engine.run([ticket for ticket, _ in planned])
         with self.watch.on("conclude"):
             replies = [
-                event.message
-                for session, ticket, outcome in zip(self._sessions, tickets, outcomes, strict=True)
-                for event in session.conclude(ticket, outcome)
-                if isinstance(event, Reply)
+                said
+                for (ticket, conclude), outcome in zip(planned, outcomes, strict=True)
+                for said in conclude(ticket, outcome)
             ]
         with self.watch.on("encode"):
             answers = [encode(reply) for reply in replies]
         assert len(answers) == len(self._sessions)
+
+
+def _plan(session: Session, frame: Frame | RawFrame, pose: Read) -> tuple[Ticket, Conclude]:
+    """A frame's ticket, and who takes its outcome: at once where nothing is unusual, as in a turn of the service."""
+    prompt = session.prompt(frame, pose) if isinstance(frame, RawFrame) else None
+    if prompt is not None:
+        return prompt, session.answer
+    (ticket,) = (event for event in session.receive(frame, [pose]) if isinstance(event, Ticket))
+
+    def conclude(ticket: Ticket, outcome: Outcome | EngineError) -> list[Said]:
+        return [event.message for event in session.conclude(ticket, outcome) if isinstance(event, Reply)]
+
+    return ticket, conclude
 
 
 def _frame(message: object) -> Frame | RawFrame:

@@ -35,7 +35,7 @@ RULES: tuple[tuple[str, str], ...] = (
     ("model", r"\((fervor/model\.py|onnxruntime/)"),
     ("checkpoint", r"(checkpoint|seal).*\(fervor/|\(fervor/.*(checkpoint|seal)"),
     ("encode", r"encod.*\(fervor/|\(fervor/.*encod"),
-    ("decode", r"\(fervor/(protocol/(?!trusted|messages|estimate)|session/poses)|\bdecode\w*.*\(fervor/"),
+    ("decode", r"\(fervor/(protocol/(?!\w*(trusted|messages|estimate))|session/poses)|\bdecode\w*.*\(fervor/"),
     ("engine", r"\(fervor/(engine|skeletons|rotations|emotions)"),
     ("session", r"\(fervor/(session|levels|calibration)"),
     ("send", r"(\bwrite|\bsend|_as_frame).*\(fervor/server|\(fervor/server/(outbox|wire|asgi_wire)"),
