@@ -103,4 +103,4 @@ QUICK = Plan(
     attempts=1,
     confirm_s=0.0,
 )
-"""About a minute; its figures are rough."""
+"""A minute or two; its figures are rough."""
