@@ -14,7 +14,7 @@ from fervor_bench.errors import BenchError
 from fervor_bench.frame_cost import Inside, measure_inside
 from fervor_bench.generator import Load
 from fervor_bench.machine import Places, choose_places, describe_machine
-from fervor_bench.plan import Plan
+from fervor_bench.plan import SETTLE_S, Plan
 from fervor_bench.results import Breakdown, Results
 from fervor_bench.scoring import Beside, Rates, measure_beside, measure_rates
 from fervor_bench.stages import read_stacks, sampled, share_out
@@ -123,7 +123,7 @@ def _measure_scoring(plan: Plan, folder: Path, places: Places) -> tuple[Rates, B
     with started(CONTESTANTS["fervor"], folder, places.server) as running:
         rates = measure_rates(running, places.server, plan.seconds)
         track = Track(folder, places, Traffic())
-        beside = measure_beside(running, track, Load(LIVE_SESSIONS, seconds=plan.seconds))
+        beside = measure_beside(running, track, Load(LIVE_SESSIONS, seconds=plan.seconds, settle_s=SETTLE_S))
     return rates, beside
 
 

@@ -7,7 +7,7 @@
 // sessions are started, then it waits for a line on standard input; "begin" and "end" around the measured window;
 // last, one JSON object. RESULT gets the latencies and the lags, float32 microseconds.
 //
-// First every session sends SETTLE messages as fast as they are answered, so that it is measured as it is later on.
+// First every session sends SETTLE messages, each when the one before is answered: it is measured as it is later on.
 // Open loop: latency counts from the moment when a message was due, whenever it could be sent (no coordinated
 // omission); `lag` is how late the generator itself was. Closed loop: latency counts from the send.
 //
@@ -19,7 +19,7 @@
 
 #include "session.h"
 
-enum { CONNECTS_AT_ONCE = 32, BURST = 64 };
+enum { CONNECTS_AT_ONCE = 32, SETTLE_AT_ONCE = 64, BURST = 64 };
 static const double GRACE_S = 2.0, START_S = 60.0;
 
 static struct session *sessions;
@@ -106,15 +106,15 @@ static double send_due(uint64_t *tick, int *place) {
   return 0;
 }
 
-// Closed loop, and before an open one: the first message of every session, then more as they are answered.
-static void set_off(void) {
-  if (open_loop && !settle) return;
-  for (int i = 0; i < session_count; i++) {
-    sessions[i].allowed = 1;
-    flush(sessions + i);
-  }
+// Few sessions at once: all together might be more than the service can bear.
+static void settle_all(void) {
   double give_up = now_s() + START_S;
-  while (settle && tally.settled < tally.live && now_s() < give_up) turn(now_s() + 0.1);
+  int begun = 0;
+  while (settle && tally.settled < tally.live && now_s() < give_up) {
+    while (begun < session_count && begun - tally.settled - tally.refused - tally.closed < SETTLE_AT_ONCE)
+      send_next(sessions + begun++);
+    turn(now_s() + 0.1);
+  }
 }
 
 // Returns the seconds of the window in which it was busy.
@@ -126,6 +126,7 @@ static double run(double warmup_s, double seconds) {
   int place = 0;
   bool begun = false;
   double used = 0, busy = 0, now = now_s();
+  for (int i = 0; !open_loop && i < session_count; i++) send_next(sessions + i);
   while (now < end_s && tally.live && !(tally.dry && !open_loop)) {
     if (!begun && now >= begin_s) {
       begun = true;
@@ -169,7 +170,8 @@ static uint64_t count_unanswered(void) {
 
 int main(int count, char **words) {
   if (count != 12) {
-    fputs("load HOST PORT SCRIPT RESULT SESSIONS open|closed random|lockstep spin|sleep SETTLE WARMUP_S SECONDS\n", stderr);
+    fputs("load HOST PORT SCRIPT RESULT SESSIONS open|closed random|lockstep spin|sleep SETTLE WARMUP_S SECONDS\n",
+          stderr);
     return 64;
   }
   script = read_script(words[3]);
@@ -200,7 +202,7 @@ int main(int count, char **words) {
   if (read(STDIN_FILENO, word, sizeof word) <= 0) return 0;  // whoever started this is gone
   epoll_ctl(epoll, EPOLL_CTL_DEL, STDIN_FILENO, NULL);
   spin = !strcmp(words[8], "spin");
-  set_off();
+  settle_all();
   double busy = run(atof(words[10]), atof(words[11]));
   write_result(words[4]);
   printf("{\"sessions\": %d, \"refused\": %d, \"closed\": %d, \"errors\": %lu, \"first_error\": \"%s\", "

@@ -113,6 +113,11 @@ static void flush(struct session *session) {
   }
 }
 
+static void send_next(struct session *session) {
+  session->allowed++;
+  flush(session);
+}
+
 static void unblock(struct session *session) {
   flush(session);
   if (session->phase == LIVE && session->next == session->allowed) {
@@ -139,10 +144,9 @@ static void on_answer(struct session *session, uint64_t seq, double now) {
     tally.counted++;
   }
   if (due || message + 1 != session->next || !session->unanswered || --session->unanswered) return;
-  tally.settled += session->next == settle;
-  if ((open_loop && session->next >= settle) || now >= end_s) return;
-  session->allowed++;
-  flush(session);
+  bool settled = session->next == settle;
+  tally.settled += settled;
+  if (!settled && now < end_s) send_next(session);  // settled: it waits for all others
 }
 
 static void on_seqs(struct session *session, const uint8_t *at, const uint8_t *end, double now) {
