@@ -45,7 +45,9 @@ def bench(
         int, typer.Option(min=0, max=20_000, help="Where the search for the capacity ends; 0: no search.")
     ] = 8000,
     idle: Annotated[int, typer.Option(min=0, max=20_000, help="Idle sessions to take the memory of; 0: none.")] = 1000,
-    stages: Annotated[bool, typer.Option("--stages", help="Where a frame's time goes, by py-spy, and inside the service.")] = False,
+    stages: Annotated[
+        bool, typer.Option("--stages", help="Where a frame's time goes, by py-spy, and inside the service.")
+    ] = False,
     scoring: Annotated[bool, typer.Option("--scoring", help="Scoring over HTTP, alone and beside sessions.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Rough figures in a minute or two.")] = False,
     out: Annotated[Path | None, typer.Option(help="Folder for results.md, results.json, plot.png.")] = None,

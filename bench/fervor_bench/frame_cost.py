@@ -44,8 +44,8 @@ AHEAD = 130
 FRAMES, ROUNDS = 60, 5
 """Of each crowd; the best round of each stage counts, the one that the machine disturbed least."""
 
-Conclude = Callable[[Ticket, Outcome | EngineError], Sequence[Said]]
-"""From the outcome of a ticket to what is said of it."""
+Conclude = Callable[[Sequence[Ticket], Sequence[Outcome | EngineError]], Sequence[Said]]
+"""From the outcomes of tickets to what is said of them."""
 
 STAGES = ("decode", "plan", "engine", "model", "conclude", "encode")
 
@@ -157,7 +157,7 @@ class _Crowd:
             replies = [
                 said
                 for (ticket, conclude), outcome in zip(planned, outcomes, strict=True)
-                for said in conclude(ticket, outcome)
+                for said in conclude([ticket], [outcome])
             ]
         with self.watch.on("encode"):
             answers = [encode(reply) for reply in replies]
@@ -166,13 +166,14 @@ class _Crowd:
 
 def _plan(session: Session, frame: Frame | RawFrame, pose: Read) -> tuple[Ticket, Conclude]:
     """A frame's ticket, and who takes its outcome: at once where nothing is unusual, as in a turn of the service."""
-    prompt = session.prompt(frame, pose) if isinstance(frame, RawFrame) else None
-    if prompt is not None:
-        return prompt, session.answer
+    prompt = session.prompt(frame, [pose]) if isinstance(frame, RawFrame) else ()
+    if prompt:
+        return prompt[0], session.answer
     (ticket,) = (event for event in session.receive(frame, [pose]) if isinstance(event, Ticket))
 
-    def conclude(ticket: Ticket, outcome: Outcome | EngineError) -> list[Said]:
-        return [event.message for event in session.conclude(ticket, outcome) if isinstance(event, Reply)]
+    def conclude(tickets: Sequence[Ticket], outcomes: Sequence[Outcome | EngineError]) -> list[Said]:
+        events = session.conclude(tickets[0], outcomes[0])
+        return [event.message for event in events if isinstance(event, Reply)]
 
     return ticket, conclude
 
