@@ -202,7 +202,7 @@ def test_the_command_prints_and_writes(workshop: Path, tmp_path: Path) -> None:
     assert said.returncode == 0, said.stderr
     assert "floor, msgpack" in said.stdout
     assert {path.name for path in out.iterdir()} == {"results.md", "results.json", "plot.png"}
-    assert "| floor, msgpack, 6 frames a message |" in (out / "results.md").read_text()
+    assert "| floor, msgpack, 6 a message |" in (out / "results.md").read_text()
 
 
 def test_numbers_that_are_none_are_refused() -> None:

@@ -90,12 +90,12 @@ def test_every_row_has_a_cell_for_every_heading() -> None:
     [
         ("naive, msgpack", "1.0", "5%", "10%"),
         ("fervor, msgpack", "5.0", "25%", "50%"),
-        ("fervor, msgpack, 6 frames a message", "6.7", "20%", "-"),  # beside the floor with as many frames
+        ("fervor, msgpack, 6 a message", "6.7", "20%", "-"),  # beside the floor with as many frames
         ("floor, msgpack", "20.0", "100%", "200%"),
     ],
 )
 def test_costs_stand_beside_the_naive_service_and_both_floors(row: str, naive: str, floor: str, two: str) -> None:
-    found = sheet("a frame, saturated")
+    found = sheet("processor time of a frame")
     assert (cell(found, row, "x naive"), cell(found, row, "of floor"), cell(found, row, "of floor-two")) == (
         naive,
         floor,

@@ -9,7 +9,7 @@ from fervor_bench.contestant import CONTESTANTS
 from fervor_bench.generator import Arrivals, Loop
 from fervor_bench.plan import Encodings
 
-PIPED = 120
+PIPED = 150
 """Columns of tables that no terminal shows."""
 
 

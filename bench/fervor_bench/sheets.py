@@ -66,13 +66,13 @@ def remarks(results: Results) -> Iterator[str]:
 def _costs(results: Results) -> Sheet:
     headings = (
         "contestant",
-        "processor time, µs",
+        "µs a frame",
         "x naive",
         *(f"of {name}" for name in FLOORS),
         "frames/s",
         "generator",
-        "idle session, KiB",
-        "ready after, s",
+        "idle, KiB",
+        "ready, s",
     )
     rows = [
         (
@@ -88,7 +88,9 @@ def _costs(results: Results) -> Sheet:
         for standing in results.standings
         for cost, saturated in [(_cost(standing), standing.saturated)]
     ]
-    return Sheet(f"a frame, saturated: {results.plan.saturated} sessions, closed loop", headings, rows)
+    return Sheet(
+        f"processor time of a frame, saturated: {results.plan.saturated} sessions, closed loop", headings, rows
+    )
 
 
 def _capacities(results: Results) -> Sheet:
@@ -179,7 +181,7 @@ def inside(costs: Sequence[Inside]) -> Sheet:
 
 
 def _rates(rates: Rates) -> Sheet:
-    headings = ("body", "sequences", "frames each", "processor time, µs a frame", "x model alone", "frames/s")
+    headings = ("body", "sequences", "frames each", "µs a frame", "x model alone", "frames/s")
     rows = [
         (
             rate.kind,
@@ -192,7 +194,7 @@ def _rates(rates: Rates) -> Sheet:
         for rate in rates.kinds
     ]
     rows.append(("model alone, one state", f"{ALONE[0]}", f"{ALONE[1]}", _number(rates.model_us), "1.0", NONE))
-    return Sheet("scoring over HTTP, one processor, two states", headings, rows)
+    return Sheet("scoring over HTTP: processor time, one processor, two states", headings, rows)
 
 
 def _beside(beside: Beside) -> Sheet:

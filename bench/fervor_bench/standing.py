@@ -46,7 +46,7 @@ class Standing:
     @property
     def name(self) -> str:
         """Contestant and messages."""
-        several = f", {self.frames} frames a message" if self.frames > 1 else ""
+        several = f", {self.frames} a message" if self.frames > 1 else ""
         return f"{self.contestant}, {self.encoding}{several}"
 
     @property
