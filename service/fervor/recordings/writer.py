@@ -1,7 +1,8 @@
 """Writes recordings as canonical ones: whatever the source was, the file holds the rig's local rotations.
 
 CSV, JSONL and NPZ keep every bit and every gap. BVH knows neither masks nor uneven times: unobserved joints hold their
-last pose there, and frames are put on an even grid. It is the rig in an N-pose, on an average body, standing still.
+last pose there, and frames are put on an even grid. It is the rig in an N-pose, on the standard body in centimetres,
+standing still.
 """
 
 from collections.abc import Mapping
@@ -16,8 +17,8 @@ from fervor.recordings.table_csv import csv_of
 from fervor.recordings.table_jsonl import jsonl_of
 from fervor.recordings.table_npz import npz_of
 from fervor.rotations import IDENTITY, slerp, to_rpy
-from fervor.skeletons.average_body import OFFSETS_CM, TIPS_CM
 from fervor.skeletons.rig import CHILD_SEGMENT, PARENT_SEGMENT, SEGMENTS
+from fervor.skeletons.standard_body import HIPS_ABOVE_GROUND_M, OFFSETS_M, TIPS_M, Offset
 
 Array = npt.NDArray[np.float64]
 
@@ -81,7 +82,7 @@ def bvh_of(recording: Recording) -> str:
     order = _tree_order()
     columns = np.array([CHILD_SEGMENT.index(segment) for segment in order if segment in CHILD_SEGMENT])
     turns = degrees[:, columns].reshape(len(local), -1)
-    root = " ".join(str(part) for part in (*OFFSETS_CM["pelvis"], 0, 0, 0))
+    root = f"{_centimetres((0.0, HIPS_ABOVE_GROUND_M, 0.0))} 0 0 0"
     rows = [f"{root} {' '.join(f'{value:.9f}' for value in row)}" for row in turns.tolist()]
     head = ["HIERARCHY", *_node(0, 0), "MOTION", f"Frames: {len(rows)}", f"Frame Time: {step:.9g}"]
     return "\n".join([*head, *rows]) + "\n"
@@ -122,16 +123,19 @@ def _tree_order(segment: int = 0) -> list[int]:
 def _node(segment: int, depth: int) -> list[str]:
     """The lines of a segment and all that hangs on it."""
     name, tab, deeper = SEGMENTS[segment], "\t" * depth, "\t" * (depth + 1)
-    offset = " ".join(str(part) for part in ((0, 0, 0) if depth == 0 else OFFSETS_CM[name]))
     channels = "3 Zrotation Yrotation Xrotation"
     lines = [
         f"{tab}{'JOINT' if depth else 'ROOT'} {_BVH_NAMES[name]}",
         f"{tab}{{",
-        f"{deeper}OFFSET {offset}",
+        f"{deeper}OFFSET {_centimetres(OFFSETS_M.get(name, (0.0, 0.0, 0.0)))}",
         f"{deeper}CHANNELS {channels if depth else f'6 Xposition Yposition Zposition {channels[2:]}'}",
     ]
     for child in _children(segment):
         lines += _node(child, depth + 1)
-    if name in TIPS_CM:
-        lines += [f"{deeper}End Site", f"{deeper}{{", f"{deeper}\tOFFSET 0 {TIPS_CM[name]} 0", f"{deeper}}}"]
+    if name in TIPS_M:
+        lines += [f"{deeper}End Site", f"{deeper}{{", f"{deeper}\tOFFSET {_centimetres(TIPS_M[name])}", f"{deeper}}}"]
     return [*lines, f"{tab}}}"]
+
+
+def _centimetres(offset: Offset) -> str:
+    return " ".join(f"{100.0 * part:g}" for part in offset)

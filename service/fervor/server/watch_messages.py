@@ -58,7 +58,7 @@ class WatchStarted(_Told):
     joints: tuple[str, ...] = Field(description="of the rig, in the order of `q`")
     parents: tuple[int, ...] = Field(description="index of each joint's parent; -1 is the pelvis")
     pelvis: Point = Field(description="of a standing body on the ground, metres; X its left, Y up, Z forward")
-    offsets: tuple[Point, ...] = Field(description="of each joint from its parent in an average body, metres")
+    offsets: tuple[Point, ...] = Field(description="of each joint from its parent in the standard body, metres")
     tips: tuple[Point | None, ...] = Field(description="where the body ends beyond a joint, metres; null: at another")
     workers: int = Field(description="processes of the service; a snapshot shows the sessions of one")
     rate_hz: float = Field(description="snapshots a second at most")

@@ -20,7 +20,6 @@ from fervor.server.watch_messages import (
     MOST_SHOWN,
     BodyName,
     Look,
-    Point,
     SeenBody,
     SeenSession,
     Snapshot,
@@ -28,8 +27,8 @@ from fervor.server.watch_messages import (
 )
 from fervor.session.body import Body
 from fervor.session.session import Session
-from fervor.skeletons.average_body import OFFSETS_CM, TIPS_CM, Offset
 from fervor.skeletons.rig import CHILD_SEGMENT, JOINTS, PARENTS, SEGMENTS
+from fervor.skeletons.standard_body import HIPS_ABOVE_GROUND_M, OFFSETS_M, TIPS_M
 
 RATE_HZ = 12.0
 """Pictures a second: motion looks whole, and a page costs little."""
@@ -51,16 +50,12 @@ def started(service: Service) -> WatchStarted:
         hysteresis=service.model.metadata.levels.hysteresis,
         joints=JOINTS,
         parents=PARENTS,
-        pelvis=_metres(OFFSETS_CM["pelvis"]),
-        offsets=tuple(_metres(OFFSETS_CM[segment]) for segment in _MOVED),
-        tips=tuple(_metres((0.0, TIPS_CM[segment], 0.0)) if segment in TIPS_CM else None for segment in _MOVED),
+        pelvis=(0.0, HIPS_ABOVE_GROUND_M, 0.0),
+        offsets=tuple(OFFSETS_M[segment] for segment in _MOVED),
+        tips=tuple(map(TIPS_M.get, _MOVED)),
         workers=service.settings.workers,
         rate_hz=RATE_HZ,
     )
-
-
-def _metres(offset: Offset) -> Point:
-    return offset[0] / 100.0, offset[1] / 100.0, offset[2] / 100.0
 
 
 def take_snapshot(service: Service, look: Look) -> Snapshot:

@@ -1,8 +1,8 @@
 """A standard body: where the joints are in space, worked out from rig rotations (forward kinematics).
 
-Pictures and handcrafted features are about positions, rotations are what a pose has; so every pose is put on one
-body. Bones are a 1.70 m adult's (Winter 2009, Biomechanics and Motor Control of Human Movement, table 4.1 and figure
-4.1, shares of the height; trunk split at L4/L5 and T12). Axes of the rig: X left, Y up, Z forward; the pelvis is
+Pictures, BVH files and handcrafted features are about positions, rotations are what a pose has; so every pose is put
+on one body. Bones are a 1.70 m adult's (Winter 2009, Biomechanics and Motor Control of Human Movement, table 4.1 and
+figure 4.1, shares of the height; trunk split at L4/L5 and T12). Axes of the rig: X left, Y up, Z forward; the pelvis is
 upright at the origin, as the rig has no root.
 """
 
@@ -15,8 +15,9 @@ from fervor.rotations import multiply, rotate
 from fervor.skeletons.rig import CHILD_SEGMENT, JOINTS, PARENT_SEGMENT, SEGMENTS
 
 Floats = npt.NDArray[np.float64]
+Offset = tuple[float, float, float]
 
-BONES: Mapping[str, tuple[str, str, tuple[float, float, float]]] = {
+BONES: Mapping[str, tuple[str, str, Offset]] = {
     "spine": ("", "pelvis", (0.0, 0.10, 0.0)),
     "spine_mid": ("spine", "abdomen", (0.0, 0.17, 0.0)),
     "midshoulder": ("spine_mid", "thorax", (0.0, 0.22, 0.0)),
@@ -34,6 +35,29 @@ BONES: Mapping[str, tuple[str, str, tuple[float, float, float]]] = {
     "l_ankle": ("l_knee", "l_shank", (0.0, -0.42, 0.0)),
 }
 """Point: from which point ("" the middle of the hips), with which segment, and where (metres; left, up, forward)."""
+
+HIPS_ABOVE_GROUND_M = 0.906
+"""Of the standing body: its legs, and an ankle of 0.066 m."""
+
+_TURNS_AT: Mapping[str, str] = {
+    "abdomen": "spine", "thorax": "spine_mid", "head": "neck", "l_uparm": "l_shoulder", "l_forearm": "l_elbow",
+    "l_hand": "l_wrist", "l_thigh": "l_hip", "l_shank": "l_knee",
+}  # fmt: skip
+"""The point about which a segment turns; always one that the segment above carries."""
+
+
+def _both_sides(left: Mapping[str, Offset]) -> dict[str, Offset]:
+    """The same for the right side's segments, too."""
+    return {**left, **{f"r{name[1:]}": (0.0 - x, y, z) for name, (x, y, z) in left.items() if name.startswith("l_")}}
+
+
+OFFSETS_M: Mapping[str, Offset] = _both_sides({segment: BONES[point][2] for segment, point in _TURNS_AT.items()})
+"""Where a segment turns, from where the segment above it turns; the pelvis turns in the middle of the hips."""
+
+TIPS_M: Mapping[str, Offset] = _both_sides(
+    {"head": (0.0, 0.25, 0.0), "l_hand": (0.0, -0.18, 0.0), "l_shank": BONES["l_ankle"][2]}
+)
+"""Where segments end that carry no other, from where they turn: the crown, the fingertips, the ankles."""
 
 MIDHIP = "midhip"
 
