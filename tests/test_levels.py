@@ -18,9 +18,16 @@ def run(values, dt=0.1):
     return levels
 
 
-def test_first_takes_its_side_at_once():
-    assert run([0.5]) == [Level.STRONG]
-    assert run([0.49]) == [Level.WEAK]
+def test_first_is_strong_above_the_band_at_once():
+    assert run([0.5 + 0.05]) == [Level.STRONG]
+    assert run([0.54]) == run([0.5]) == run([0.49]) == [Level.WEAK]
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=100))
+def test_strong_never_begins_inside_the_band(values):
+    levels = [Level.WEAK, *run(values)]
+    for value, before, level in zip(values, levels[:-1], levels[1:], strict=True):
+        assert level is before or value >= 0.5 + 0.05 or (level is Level.WEAK and value < 0.5 - 0.05)
 
 
 def test_noise_inside_the_band_changes_nothing():

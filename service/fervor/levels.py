@@ -7,7 +7,7 @@ import msgspec
 
 
 class Level(StrEnum):
-    """How strongly an emotion shows: weak below the threshold, strong from it on."""
+    """How strongly an emotion shows: weak below the threshold, strong above, with hysteresis between."""
 
     WEAK = "weak"
     STRONG = "strong"
@@ -32,10 +32,11 @@ def next_level(
     """The level after an intensity in [0, 1] at `time` (seconds, client clock).
 
     A level changes only when the intensity leaves the band `threshold` ± `hysteresis` on the other side and the level
-    has been held for `dwell` seconds. The first estimate takes its side of the threshold at once.
+    has been held for `dwell` seconds. The first estimate is strong from the band's upper edge on, without a dwell: a
+    robot acts on strong, so strong is never said for want of a level before.
     """
     if state is None:
-        return LevelState(Level.STRONG if intensity >= threshold else Level.WEAK, time)
+        return LevelState(Level.STRONG if intensity >= threshold + hysteresis else Level.WEAK, time)
     if time - state.since < dwell:
         return state
     if state.level is Level.WEAK and intensity >= threshold + hysteresis:
@@ -54,7 +55,7 @@ def levels_over_time(
     up, down = threshold + hysteresis, threshold - hysteresis
     for intensity, time in zip(intensities, times, strict=True):
         if level is None:
-            level, since = (Level.STRONG if intensity >= threshold else Level.WEAK), time
+            level, since = (Level.STRONG if intensity >= up else Level.WEAK), time
         elif time - since >= dwell and (intensity >= up if level is Level.WEAK else intensity < down):
             level, since = (Level.STRONG if level is Level.WEAK else Level.WEAK), time
         levels.append(level)
