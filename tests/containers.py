@@ -187,11 +187,13 @@ def other_images() -> tuple[str, str]:
 
 
 class Compose:
-    """A project of compose.yaml."""
+    """A project of compose.yaml, with another file of deploy/ on top if wanted."""
 
-    def __init__(self, docker: Docker, name: str, *profiles: str, **variables: object) -> None:
+    def __init__(self, docker: Docker, name: str, *profiles: str, file: str | None = None, **variables: object) -> None:
         self._docker = docker
+        files = ["compose.yaml", *([f"deploy/{file}"] if file else [])]
         chosen = [word for profile in profiles for word in ("--profile", profile)]
+        chosen += [word for each in files for word in ("--file", str(ROOT / each))]
         self._start = ("compose", "--project-name", name, "--project-directory", ROOT, *chosen)
         self._variables: Mapping[str, str] = {key: str(value) for key, value in variables.items()}
 

@@ -1,6 +1,7 @@
 """The image and compose.yaml, for real: what runs in the container, and what a stream notices of its end: nothing."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
-from websockets import ConnectionClosed
+from websockets import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from bodies import motion
@@ -29,7 +30,8 @@ from containers import (
 )
 from crowd import Robots, assert_told_as_if_nothing_had_happened
 from fervor.cli.local import free_port
-from fervor.settings import MIB
+from fervor.server.watch_messages import SUBPROTOCOL
+from fervor.settings import ENV_PREFIX, MIB
 from live import PROTOCOL, Live, frames_of
 from pages import ROOT
 from program import write_bvh
@@ -39,6 +41,10 @@ MOST_MB = 220
 """Megabytes that the service may add to its base image."""
 
 FEW_ROBOTS = 4
+
+SECRETS = "compose.secrets.yaml"
+
+SECRET_FILES = ("--file", "compose.yaml", "--file", f"deploy/{SECRETS}")
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +83,34 @@ def test_compose_starts_the_service_alone_unless_asked_for_more() -> None:
     assert services() == {"fervor"}
     assert services("replicas") == {"fervor", "replica", "haproxy"}
     assert services("watch") == {"fervor", "prometheus", "grafana"}
+
+
+def composed(*options: str, **variables: str) -> dict[str, Any]:
+    """What Compose makes of its files, with all profiles."""
+    need("docker-compose")
+    command = [str(which("docker-compose")), *options, "--profile", "*", "config", "--format", "json"]
+    clean = {name: value for name, value in os.environ.items() if not name.startswith(ENV_PREFIX)}
+    done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True, env={**clean, **variables})
+    made: dict[str, Any] = json.loads(done.stdout)["services"]
+    return made
+
+
+def test_without_tokens_no_other_machine_gets_in() -> None:
+    services = composed()
+    opened = [port for service in services.values() for port in service.get("ports", ())]
+    assert len(opened) == 3
+    assert {port["host_ip"] for port in opened} == {"127.0.0.1"}
+    (port,) = composed(FERVOR_PUBLISH="8080")["fervor"]["ports"]
+    assert "host_ip" not in port
+
+
+def test_secrets_come_from_files_for_all_that_serve() -> None:
+    services = composed(*SECRET_FILES)
+    for service in (services["fervor"], services["replica"]):
+        mounted = {f"/run/secrets/{secret['source']}" for secret in service["secrets"]}
+        environment = service["environment"]
+        assert mounted == {environment["FERVOR_TOKENS_FILE"], environment["FERVOR_CHECKPOINT_KEYS_FILE"]}
+        assert not environment["FERVOR_CHECKPOINT_KEYS"], "two homes of the keys are an error"
 
 
 # --- the image --------------------------------------------------------------------------------------------------------
@@ -156,6 +190,66 @@ def test_sigterm_gives_last_checkpoints_and_ends_with_0(docker: Docker, workers:
     assert heard[-1]["seq"] == 2
     assert docker.inspect(container)["State"]["ExitCode"] == 0
     assert "Traceback" not in docker.logs(container)
+
+
+# --- secrets ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def secrets(tmp_path: Path) -> Path:
+    """A folder of the operator alone, with the files that deploy/compose.secrets.yaml wants."""
+    folder = tmp_path / "secrets"
+    folder.mkdir(mode=0o700)
+    for name, text in (("tokens", "robot-7 alpha\n"), ("checkpoint-keys", "a-key-of-more-than-sixteen-characters\n")):
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def says(address: str, path: str, subprotocol: str, token: str | None) -> str:
+    """The type of the first message to who asks with a token, or the status of the refusal."""
+    shown = [] if token is None else [f"fervor.token.{token}"]
+    try:
+        with connect(f"ws://{address}{path}", subprotocols=[subprotocol, *shown]) as socket:
+            if path.endswith("stream"):
+                socket.send(json.dumps({"type": "session.start"}))
+            return str(json.loads(socket.recv())["type"])
+    except InvalidStatus as refused:
+        return str(refused.response.status_code)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_files_of_tokens_guard_streams_and_page_and_may_change(docker: Docker, secrets: Path) -> None:
+    address = f"127.0.0.1:{free_port()}"
+    variables = {"FERVOR_PUBLISH": address, "FERVOR_SECRETS": secrets}
+    with Compose(docker, "guarded", file=SECRETS, **variables).up() as compose:
+        assert httpx.get(f"http://{address}/", timeout=30).status_code == 200, "the page, which asks for the token"
+        for path, subprotocol, first in (
+            ("/v1/stream", PROTOCOL, "session.started"),
+            ("/v1/watch", SUBPROTOCOL, "watch.started"),
+        ):
+            assert says(address, path, subprotocol, None) == "401"
+            assert says(address, path, subprotocol, "beta") == "401"
+            assert says(address, path, subprotocol, "alpha") == first
+        with (secrets / "tokens").open("a", encoding="utf-8") as file:
+            file.write("robot-8 beta\n")
+        until(lambda: says(address, "/v1/stream", PROTOCOL, "beta") == "session.started")
+        assert says(address, "/v1/stream", PROTOCOL, "alpha") == "session.started"
+        (container,) = compose.containers("fervor")
+        told = json.dumps(docker.inspect(container)) + docker.logs(container)
+        assert not any(secret in told for secret in ("alpha", "beta", "more-than-sixteen"))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("missing", ["tokens", "checkpoint-keys"])
+def test_without_a_file_of_secrets_nothing_starts(docker: Docker, secrets: Path, missing: str) -> None:
+    (secrets / missing).unlink()
+    variables = {"FERVOR_PUBLISH": f"127.0.0.1:{free_port()}", "FERVOR_SECRETS": secrets}
+    compose = Compose(docker, "unguarded", file=SECRETS, **variables)
+    with pytest.raises(AssertionError, match=missing), compose.up():
+        pass
+    assert not (secrets / missing).exists(), "a folder in its place would be no help"
 
 
 # --- replicas ---------------------------------------------------------------------------------------------------------

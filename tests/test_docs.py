@@ -107,6 +107,7 @@ def run_command(command: list[str], live: Live, where: str) -> None:
             compose = (ROOT / "compose.yaml").read_text(encoding="utf-8")
             profiles = [name for option, name in pairwise(arguments) if option == "--profile"]
             assert all(f"profiles: [{name}]" in compose for name in profiles), where
+            assert all((ROOT / name).exists() for option, name in pairwise(arguments) if option == "-f"), where
         case variable if "=" in variable:
             run_command(arguments, live, where)
         case "kubectl" | "k6" | "openssl" | ".venv-face/bin/python":  # what they act on must be there
@@ -116,9 +117,9 @@ def run_command(command: list[str], live: Live, where: str) -> None:
         case "make":
             makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
             assert re.search(rf"^{arguments[0]}:", makefile, re.MULTILINE), where
-        case "." | "npm":  # the latter is run by test_js_docs.py
-            known = ([".venv/bin/activate"], ["install/setup.sh"], ["install", "./clients/js"])
-            assert arguments in known, where
+        case "." | "npm" | "install":  # npm's are run by test_js_docs.py
+            known = (".venv/bin/activate", "install/setup.sh", "install ./clients/js", "-d -m 700 secrets")
+            assert " ".join(arguments) in known, where
         case _:
             check_ros(command, where)
 
