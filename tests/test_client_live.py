@@ -190,6 +190,25 @@ async def test_a_strange_sensor_is_calibrated_and_its_skeleton_used_again(live: 
         assert (await again.estimate(turned, t=0.0)).intensity == (await plain.estimate(still, t=0.0)).intensity
 
 
+async def test_two_calibrations_at_once_are_told_apart(live: Live) -> None:
+    """One that nobody held a pose for is replaced; one that was about to be answered has its own answer."""
+    turned = np.tile([0.5, 0.5, 0.5, 0.5], (14, 1))
+    async with fervor_client.connect(live.stream, skeleton=strange()) as session:
+        replaced = asyncio.create_task(session.calibrate(body="nobody", name="first"))
+        await asyncio.sleep(0)  # it is asked
+        second = asyncio.create_task(session.calibrate(seconds=0.5, name="second"))
+        await asyncio.sleep(0)
+        for number in range(16):
+            await session.send(turned, t=number / 30)
+        third = asyncio.create_task(session.calibrate(seconds=0.2, name="third"))
+        await asyncio.sleep(0)
+        for number in range(16, 23):
+            await session.send(turned, t=number / 30)
+        with pytest.raises(InputError, match="another calibration took the place of this one"):
+            await replaced
+        assert [(await each).skeleton.name for each in (second, third)] == ["second", "third"]
+
+
 def test_a_calibration_while_moving_fails_and_the_session_goes_on(live: Live) -> None:
     with fervor_client.sync.connect(live.stream, skeleton=strange()) as session:
         over = threading.Event()

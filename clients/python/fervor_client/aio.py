@@ -141,15 +141,15 @@ class Session(Connected):
         It is in force from then on. Keep the `skeleton` of the answer as JSON; `connect` takes it again.
 
         Raises:
-            InputError: the pose was not held still; nothing changed.
+            InputError: the pose was not held still, and nothing changed; or another calibration took its place.
             TimeoutError: not enough frames came in time.
             FervorError: the session is lost or has ended.
         """
-        self._conversation.calibrate(calibration(held))
+        number = self._conversation.calibrate(calibration(held))
         await self._pump()
         try:
             async with asyncio.timeout(timeout), self._news:
-                while (found := self._conversation.take_calibration()) is None:
+                while (found := self._conversation.take_calibration(number)) is None:
                     await self._news.wait()
                 return found
         except TimeoutError:

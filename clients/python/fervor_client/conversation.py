@@ -68,8 +68,6 @@ class Conversation(Standing):
         self._codec = CODECS[SUBPROTOCOL]
         self._framer = Framer(now)
         self._answers = Answers(latest=start.delivery == "latest")
-        self._calibrating = False
-        self._calibration: SessionCalibrated | FervorError | None = None
         self._line = Line(start, retries, now)
 
     @property
@@ -139,23 +137,27 @@ class Conversation(Standing):
         self.must_be_open()
         self._answers.count_reset()
         payload = self._codec.encode(BodyReset(body=body))
-        self._line.log.add_reset(body, payload)
-        self._line.post(payload)
+        if self._line.log.add_reset(body, payload):
+            self._line.post(payload)
 
     def end_body(self, body: str) -> None:
         """Say that `body` is gone."""
         self.must_be_open()
         payload = self._codec.encode(BodyEnd(body=body))
-        self._line.log.add_end(body, payload)
-        self._line.post(payload)
+        if self._line.log.add_end(body, payload):
+            self._line.post(payload)
 
-    def calibrate(self, request: SessionCalibrate) -> None:
-        """Make the service take its alignment from the frames that follow; after a cut it is asked again."""
+    def calibrate(self, request: SessionCalibrate) -> int:
+        """Make the service take its alignment from the frames that follow; after a cut it is asked again.
+
+        Returns:
+            The number for `take_calibration`.
+        """
         self.must_be_open()
         payload = self._codec.encode(request)
-        self._line.log.add_calibrate(request.body, payload)
+        number = self._line.log.add_calibrate(request, payload)
         self._line.post(payload)
-        self._calibrating, self._calibration = True, None
+        return number
 
     def ping(self) -> str | bytes:
         """A payload that says no more than that we are here; not in the queue of the others."""
@@ -214,7 +216,8 @@ class Conversation(Standing):
         if not self._line.resumes or self.state in (State.NEW, State.STARTING):
             self.lost(reason)
             return None
-        if self.state is State.ENDING and not self.in_flight:  # only the goodbye is missing
+        waits = self.in_flight or self._line.log.calibrations.decided
+        if self.state is State.ENDING and not waits:  # only the goodbye is missing
             self.ended(self._answers.totals)
             return None
         news = self._line.again(reason)
@@ -246,15 +249,13 @@ class Conversation(Standing):
             raise self.failure or Unreachable(f"the session with {self.url} ended before frame {key[1]} was answered")
         return answer
 
-    def take_calibration(self) -> SessionCalibrated | None:
-        """What the calibration found; None while it is under way.
+    def take_calibration(self, number: int) -> SessionCalibrated | None:
+        """What a calibration found, once; None while it is under way.
 
         Raises:
-            FervorError: it failed, or the conversation is over.
+            FervorError: it failed, another one took its place, or the conversation is over.
         """
-        found = self._calibration
-        if isinstance(found, FervorError):
-            raise found
+        found = self._line.log.calibrations.take(number)
         if found is None and self.over:
             self.must_be_open()
         return found
@@ -306,8 +307,7 @@ class Conversation(Standing):
         asked = self._start.skeleton
         name = asked if isinstance(asked, str) else asked.name
         self._start = self._start.model_copy(update={"skeleton": message.skeleton.model_copy(update={"name": name})})
-        self._line.log.calibrated(message.checkpoints)
-        self._calibrating, self._calibration = False, message.model_copy(update={"checkpoints": ()})
+        self._line.log.calibrated(message)
 
     def _refused(self, message: Error) -> list[News]:
         error = told(message)
@@ -323,8 +323,6 @@ class Conversation(Standing):
                 self._line.log.refused(key, forget=not isinstance(error, EngineError))
                 self._line.progress()
             return [error] if awaited is False else []
-        if self._calibrating and type(error) is InputError:
-            self._calibrating, self._calibration = False, error
-            self._line.log.calibration_failed()
+        if type(error) is InputError and self._line.log.calibration_failed(message.body, error):
             return []
         return [error]

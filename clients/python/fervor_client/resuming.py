@@ -11,9 +11,11 @@ import logging
 from collections.abc import Callable, Iterable
 from math import inf
 
+from fervor.errors import InputError
 from fervor.protocol.codec import Codec
-from fervor.protocol.messages import BodyEnd, Checkpoint, Frame, Resumed
+from fervor.protocol.messages import BodyEnd, Checkpoint, Frame, Resumed, SessionCalibrate, SessionCalibrated
 from fervor_client.answers import Key
+from fervor_client.calibrations import Calibrations
 from fervor_client.track import Entry, Payload, Track
 
 logger = logging.getLogger("fervor_client")
@@ -47,6 +49,7 @@ class Log:
         """Client time without a frame after which the service may forget a body."""
         self.anew: set[str] = set()
         """Bodies that began anew and have no estimate yet."""
+        self.calibrations = Calibrations(timed=idles)
         self._codec = codec
         self._latest = latest
         self._ttl_s = emotion_ttl_s
@@ -55,8 +58,6 @@ class Log:
         self._keeps = keeps
         self._tracks: dict[str, Track] = {}
         self._open: dict[Key, Entry] = {}  # frames under way
-        self._calibrate: Entry | None = None
-        self._held = ""  # the body whose frames it rests on
         self._place = 0
         self._stale: tuple[str, ...] = ()  # bodies that the service resumed, and that are none any more
 
@@ -65,17 +66,20 @@ class Log:
     def remind(self, frame: Frame) -> Frame:
         """The frame with the body's label, where it brings none and the service has lost the one in force."""
         track = self._tracks.get(frame.body)
-        if track is None or not track.unlabelled or frame.emotion is not None:
+        if track is None or not track.unlabelled or frame.emotion is not None or self._away(track, _time(frame)):
             return frame
         return frame.model_copy(update={"emotion": track.label_at(_time(frame), self._ttl_s)})
 
     def add_frame(self, frame: Frame, payload: Payload) -> None:
         """A frame was sent."""
+        self.calibrations.sent((frame.body, frame.seq), _time(frame))
         if not self._keeps:
             return
         track = self._tracks.setdefault(frame.body, Track())
-        self._follow(track, frame)
+        begins = self._away(track, _time(frame))
+        self._follow(track, frame, back=begins and track.here)
         entry = self._append(track, payload, seq=frame.seq)
+        entry.begins = begins
         track.unlabelled = False
         if frame.emotion is not None:
             entry.label = (frame.emotion, _time(frame))
@@ -83,29 +87,37 @@ class Log:
         if sum(len(track.entries) for track in self._tracks.values()) > MOST_KEPT + len(self._open):
             self._give_up_longest()
 
-    def add_reset(self, body: str, payload: Payload) -> None:
-        """A body was reset; nothing to repeat where the service knows none of that name."""
+    def add_reset(self, body: str, payload: Payload) -> bool:
+        """A body was reset; whether to tell the service, which has nothing to reset of a body that it lost."""
         track = self._tracks.get(body)
         if track is not None and track.here:
             self._append(track, payload)
+        return not self._lost(body)
 
-    def add_end(self, body: str, payload: Payload) -> None:
-        """A body has gone."""
-        track = self._tracks.get(body)
+    def add_end(self, body: str, payload: Payload) -> bool:
+        """A body has gone; whether to tell the service, which knows no more of a body that it lost."""
+        track, lost = self._tracks.get(body), self._lost(body)
         if track is not None and track.here:
             self._end(body, track, payload)
+        elif track is not None and lost:
+            track.forget()
+            self._bury(body, track)
+        if lost:
+            self.anew.discard(body)
+        return not lost
 
-    def add_calibrate(self, body: str, payload: Payload) -> None:
-        """A calibration from a pose of `body` was asked for, in place of any before."""
-        before, self._held = self._held, body
-        self._calibrate = Entry(self._next_place(), payload)
-        self._bury_by_name(before)
+    def add_calibrate(self, request: SessionCalibrate, payload: Payload) -> int:
+        """A calibration was asked for; its number."""
+        number = self.calibrations.ask(request, Entry(self._next_place(), payload))
+        self._bury_all()
+        return number
 
     # --- what comes ---------------------------------------------------------------------------------------------------
 
     def answered(self, keys: Iterable[Key], *, late: bool = False) -> None:
         """These frames have their estimates; a `late` one changed nothing."""
         for key in keys:
+            self.calibrations.estimated(key)
             entry, track = self._open.pop(key, None), self._tracks.get(key[0])
             if entry is None or track is None:
                 continue
@@ -120,6 +132,8 @@ class Log:
         if entry is None or track is None:
             return
         track.refused(entry, forget=forget)
+        if forget and key[0] in self.anew:  # it may have been the one that brought the label again
+            track.unlabelled = track.label is not None
         self._bury(key[0], track)
 
     def checkpoint(self, message: Checkpoint) -> bool:
@@ -142,18 +156,20 @@ class Log:
         self.anew.discard(body)
         return begins
 
-    def calibrated(self, checkpoints: Iterable[Checkpoint]) -> None:
+    def calibrated(self, message: SessionCalibrated) -> None:
         """New terms are in force, and the bodies were reset: these checkpoints take the place of all before."""
-        self.calibration_failed()
-        renewed = {each.body for each in checkpoints if self.checkpoint(each)}
+        self.calibrations.calibrated(message)
+        self._bury_all()
+        renewed = {each.body for each in message.checkpoints if self.checkpoint(each)}
         for name, track in self._tracks.items():
             if name not in renewed and not track.untouched:
                 track.give_up()
 
-    def calibration_failed(self) -> None:
-        """Nothing came of it."""
-        self._calibrate, held = None, self._held
-        self._bury_by_name(held)
+    def calibration_failed(self, body: str | None, error: InputError) -> bool:
+        """Nothing came of one; whether there was one."""
+        failed = self.calibrations.failed(body, error)
+        self._bury_all()
+        return failed
 
     # --- going on -----------------------------------------------------------------------------------------------------
 
@@ -191,8 +207,7 @@ class Log:
         for name in list(self._tracks):
             self._prepare(name, self._tracks[name])
         again = [(entry, name) for name, track in self._tracks.items() for entry in track.entries]
-        if self._calibrate is not None:
-            again.append((self._calibrate, ""))
+        again += [(entry, "") for entry in self.calibrations.entries]
         again.sort(key=lambda pair: pair[0].place)
         echoes = [(name, entry.seq) for entry, name in again if entry.seq is not None and entry.answered]
         ends = [self._codec.encode(BodyEnd(body=name)) for name in self._stale]
@@ -205,7 +220,7 @@ class Log:
         if not track.whole:
             self.anew.add(name)
         track.begin_anew()
-        if name in self.anew and track.entries:
+        if name in self.anew and track.entries and not track.entries[0].begins:
             self._remind(track, track.entries[0])
 
     def _remind(self, track: Track, entry: Entry) -> None:
@@ -231,15 +246,23 @@ class Log:
         track.entries.append(entry)
         return entry
 
-    def _follow(self, track: Track, frame: Frame) -> None:
-        """Note where a body stands, and which others the service forgets for it.
+    def _lost(self, body: str) -> bool:
+        """Whether the service lost a body, and nothing of it was sent since."""
+        return body in self.anew and (body not in self._tracks or not self._tracks[body].here)
+
+    def _away(self, track: Track, time: float) -> bool:
+        """Whether a body's last frame is so long ago that the service has forgotten it."""
+        return self._idles and track.last > -inf and time - track.last > self.idle_s
+
+    def _follow(self, track: Track, frame: Frame, *, back: bool) -> None:
+        """Note where a body stands, and which others the service forgets for it; `back`: it was forgotten itself.
 
         A frame that is refused later counts here too: only if it is the first of a body that was away, and the stream
         is then cut before the next, can a flag `gap_reset` differ.
         """
         time = _time(frame)
-        back = track.here and self._idles and time - track.last > self.idle_s
         if back:
+            self.calibrations.gone(frame.body)
             track.newest, track.last = -1, -inf
         if self._idles and (back or not track.here):
             for name, other in list(self._tracks.items()):
@@ -251,17 +274,19 @@ class Log:
         track.newest = max(track.newest, frame.seq)
 
     def _end(self, name: str, track: Track, payload: Payload) -> None:
+        self.calibrations.gone(name)
         track.end(self._append(track, payload))
         self._bury(name, track)
 
-    def _bury_by_name(self, name: str) -> None:
-        if name in self._tracks:
-            self._bury(name, self._tracks[name])
+    def _bury_all(self) -> None:
+        for name, track in list(self._tracks.items()):
+            self._bury(name, track)
 
     def _bury(self, name: str, track: Track) -> None:
-        if self._calibrate is not None and name == self._held:
+        if self.calibrations.holds(name):
             return  # what a calibration under way rests on is needed, even of a body that has gone
-        track.bury()
+        if track.bury():
+            self.anew.discard(name)
         if not track.entries and not track.here and not track.token and not track.unlabelled:
             self._tracks.pop(name, None)
 

@@ -105,10 +105,10 @@ class Session(Connected):
         See the async `Session.calibrate`.
         """
         with self._news:
-            self._conversation.calibrate(calibration(held))
+            number = self._conversation.calibrate(calibration(held))
         self._pump()
         with self._news:
-            found = self._news.wait_for(self._conversation.take_calibration, timeout)
+            found = self._news.wait_for(lambda: self._conversation.take_calibration(number), timeout)
         if found is None:
             raise TimeoutError(f"no calibration within {timeout} s; is the pose being sent?")
         return found

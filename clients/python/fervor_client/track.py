@@ -4,6 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import inf
 
+from fervor.emotions import UNKNOWN
 from fervor.protocol.messages import Emotion
 
 ANALYSER_TTL_S = 2.0
@@ -24,6 +25,8 @@ class Entry:
     answered: bool = False
     label: tuple[Emotion, float] | None = None
     """The label it brought, and its time in seconds."""
+    begins: bool = False
+    """A frame after so long that the service had forgotten the body."""
     ends: bool = False
     """The body is gone with it."""
 
@@ -57,17 +60,17 @@ class Track:
         return self.whole and not self.token and not any(entry.answered for entry in self.entries)
 
     def label_at(self, time: float, ttl_s: float | None) -> Emotion | None:
-        """The label in force at `time`, before any frame under way."""
+        """The label in force at `time`, before any frame under way; None: the one that new bodies have."""
         if self.label is None:
             return None
         emotion, given = self.label
         held = ttl_s or (inf if isinstance(emotion, str) else ANALYSER_TTL_S)
-        return emotion if time <= given + held else None
+        return emotion if time <= given + held else UNKNOWN
 
     def answered(self, entry: Entry) -> None:
         """A frame has its estimate."""
         entry.answered = True
-        self.label = entry.label or self.label
+        self.label = entry.label or (None if entry.begins else self.label)
         if not self.whole:
             self._drop_before(entry)
 
@@ -103,15 +106,21 @@ class Track:
         self.here, self.newest, self.last = False, -1, -inf
         self.endings += 1
 
-    def bury(self) -> None:
-        """Drop the lives of this body that have ended and whose frames are all answered."""
+    def bury(self) -> bool:
+        """Drop the lives of this body that have ended and whose frames are all answered; whether there was one."""
+        buried = False
         while self.endings:
             life = next(n for n, entry in enumerate(self.entries, 1) if entry.ends)
             if any(entry.seq is not None and not entry.answered for entry in list(self.entries)[:life]):
-                return
+                break
             for _ in range(life):
                 self._drop_first()
-            self.token, self.seq, self.whole = "", -1, True
+            self.token, self.seq, self.whole, buried = "", -1, True, True
+        return buried
+
+    def forget(self) -> None:
+        """The life that the service lost has ended: the next one has nothing of it."""
+        self.label, self.unlabelled, self.newest, self.last = None, False, -1, -inf
 
     def _drop_first(self) -> Entry:
         """Drop the oldest entry; where a life ends with it, only labels that were given since are in force."""
