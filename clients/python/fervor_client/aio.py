@@ -145,7 +145,9 @@ class Session(Connected):
             TimeoutError: not enough frames came in time.
             FervorError: the session is lost or has ended.
         """
-        number = self._conversation.calibrate(calibration(held))
+        async with self._news:
+            number = self._conversation.calibrate(calibration(held))
+            self._news.notify_all()  # whoever awaits one that this one replaces
         await self._pump()
         try:
             async with asyncio.timeout(timeout), self._news:

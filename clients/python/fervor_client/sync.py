@@ -106,6 +106,7 @@ class Session(Connected):
         """
         with self._news:
             number = self._conversation.calibrate(calibration(held))
+            self._news.notify_all()  # whoever awaits one that this one replaces
         self._pump()
         with self._news:
             found = self._news.wait_for(lambda: self._conversation.take_calibration(number), timeout)
