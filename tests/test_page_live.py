@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import httpx
 import onnx
 import pytest
 from playwright.sync_api import Browser
@@ -19,6 +20,7 @@ from fervor.server.watch_messages import MOST_SHOWN
 from live import Live, running
 from pages import ROOT
 from program import write_bvh
+from suits import Person, mvnx
 
 AXE = ROOT / "page" / "node_modules" / "axe-core" / "axe.min.js"
 
@@ -185,6 +187,27 @@ def test_tables_are_streamed_too(service: Live, visit, wave: Path) -> None:
     seen.card("wave.csv").wait_for()
     seen.page.get_by_role("button", name="Stop wave.csv").click()
     seen.page.locator("#own li").wait_for(state="detached")
+
+
+def test_a_suit_file_is_streamed_too(service: Live, visit, tmp_path: Path) -> None:
+    """MVN writes w first, in axes and at a rate of its own; the page shows what the service scores of the same file."""
+    suit = tmp_path / "suit.mvnx"
+    suit.write_text(mvnx(motion(480).astype(float), Person(heading=30.0, plain_axes=False)), encoding="utf-8")
+    asked = {"filename": suit.name, "emotion": "joy", "detail": "frames"}
+    answer = httpx.post(f"{service.url}/v1/score/file", params=asked, content=suit.read_bytes(), timeout=60)
+    scored = {f"{frame['intensity']:.2f}" for frame in answer.json()["sequences"][0]["estimates"]}
+    before = service.service.drain.all_totals()
+    seen = visit(service)
+    with fervor_client.sync.connect(service.stream):
+        drop(seen, suit)
+        card = seen.card("suit.mvnx")
+        card.get_by_text("gone").wait_for()
+        assert card.locator(".intensity").inner_text() in scored
+        assert card.locator("dd").all_inner_texts()[0] == "joy"
+        totals = service.service.drain.all_totals()
+    assert totals.estimates - before.estimates == 480
+    assert (totals.rejected, totals.late) == (before.rejected, before.late)
+    assert seen.complaints == []
 
 
 def test_a_file_that_is_none_is_told_in_the_services_words(service: Live, visit, tmp_path: Path) -> None:
