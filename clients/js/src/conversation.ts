@@ -8,6 +8,7 @@
 // Meanwhile it stays OPEN or ENDING, and frames are taken as ever; they leave once there is a connection.
 
 import { Answers, type Waiter } from "./answers.ts";
+import type { CalibrationWaiter } from "./calibrations.ts";
 import { CODECS, type Codec, type Encoding, type Payload } from "./codec.ts";
 import {
   EngineError,
@@ -30,12 +31,6 @@ import { Standing } from "./standing.ts";
 
 /** What a caller is told by callbacks: a recoverable error that nobody awaits, or how a reconnect goes. */
 export type News = FervorError | Reconnect;
-
-/** Who awaits a calibration. */
-export interface CalibrationWaiter {
-  resolve(found: messages.SessionCalibrated): void;
-  reject(error: FervorError): void;
-}
 
 /** What a conversation is made of. */
 export interface Opening {
@@ -64,7 +59,6 @@ export class Conversation extends Standing {
   readonly #framer: Framer;
   readonly #answers: Answers;
   readonly #line: Line;
-  #calibration: CalibrationWaiter | undefined;
 
   constructor({ start, encoding, url, retries, now, warn, mostKept }: Opening) {
     const latest = start.delivery === "latest";
@@ -136,8 +130,7 @@ export class Conversation extends Standing {
     checkBody(body);
     const message: messages.BodyReset = { type: "body.reset", body };
     this.#answers.countReset();
-    this.#line.log.addReset(body, message);
-    this.#line.post(message);
+    if (this.#line.log.addReset(body, message)) this.#line.post(message);
   }
 
   /** Say that `body` is gone. */
@@ -145,18 +138,15 @@ export class Conversation extends Standing {
     this.mustBeOpen();
     checkBody(body);
     const message: messages.BodyEnd = { type: "body.end", body };
-    this.#line.log.addEnd(body, message);
-    this.#line.post(message);
+    if (this.#line.log.addEnd(body, message)) this.#line.post(message);
   }
 
   /** Make the service take its alignment from the frames that follow; after a cut it is asked again. */
   calibrate(held: Omit<messages.SessionCalibrate, "type">, waiter: CalibrationWaiter): void {
     this.mustBeOpen();
     const message: messages.SessionCalibrate = { type: "session.calibrate", ...held };
-    this.#calibration?.reject(new InputError("another calibration took the place of this one"));
-    this.#line.log.addCalibrate(held.body ?? "0", message);
+    this.#line.log.addCalibrate(message, waiter);
     this.#line.post(message);
-    this.#calibration = waiter;
   }
 
   /** A payload that says no more than that we are here; not in the queue of the others. */
@@ -223,7 +213,7 @@ export class Conversation extends Standing {
       this.lost(reason);
       return undefined;
     }
-    if (this.state === "ending" && this.inFlight === 0) {
+    if (this.state === "ending" && this.inFlight === 0 && !this.#line.log.calibrations.decided) {
       this.#ended(this.#answers.totals); // only the goodbye is missing
       return undefined;
     }
@@ -238,7 +228,7 @@ export class Conversation extends Standing {
     this.close(failure);
     const unanswered = failure ?? new Unreachable(`the session with ${this.url} ended before this was answered`);
     this.#answers.abandon(unanswered);
-    this.#settleCalibration((waiter) => waiter.reject(unanswered));
+    this.#line.log.calibrations.abandon(unanswered);
   }
 
   // --- what came -----------------------------------------------------------------------------------------------------
@@ -251,11 +241,6 @@ export class Conversation extends Standing {
   /** Nobody awaits this frame any more: its answer will be among the unread. */
   giveUp(key: FrameKey): void {
     this.#answers.giveUp(key);
-  }
-
-  /** Nobody awaits the calibration any more; it may still come into force. */
-  giveUpCalibration(): void {
-    this.#calibration = { resolve() {}, reject() {} };
   }
 
   /** The message; null if a newer service says what this client does not know, or nothing that makes sense. */
@@ -299,14 +284,7 @@ export class Conversation extends Standing {
     const asked = this.#start.skeleton ?? "c13";
     const name = typeof asked === "string" ? asked : asked.name;
     this.#start = { ...this.#start, skeleton: { ...message.skeleton, name } };
-    this.#line.log.calibrated(message.checkpoints);
-    this.#settleCalibration((waiter) => waiter.resolve({ ...message, checkpoints: [] }));
-  }
-
-  #settleCalibration(settle: (waiter: CalibrationWaiter) => void): void {
-    const waiter = this.#calibration;
-    this.#calibration = undefined;
-    if (waiter !== undefined) settle(waiter);
+    this.#line.log.calibrated(message);
   }
 
   #refused(message: messages.Error): News[] {
@@ -318,11 +296,7 @@ export class Conversation extends Standing {
       return [];
     }
     if (message.body !== null && message.seq !== null) return this.#frameRefused(message as FrameKey, error);
-    if (this.#calibration !== undefined && error.constructor === InputError) {
-      this.#line.log.calibrationFailed();
-      this.#settleCalibration((waiter) => waiter.reject(error));
-      return [];
-    }
+    if (error.constructor === InputError && this.#line.log.calibrationFailed(message.body, error)) return [];
     return [error];
   }
 

@@ -6,8 +6,18 @@
 // unanswered frames · a frame is kept until it is answered in any case · a service forgets bodies that fell idle when
 // another appears; the same is done here, and repeated in a replay as `body.end`, so that the replay does the same.
 
+import { Calibrations, type CalibrationWaiter } from "./calibrations.ts";
+import type { InputError } from "./errors.ts";
 import { type FrameKey, FrameMap } from "./frames.ts";
-import type { BodyEnd, Checkpoint, ClientMessage, Frame, Resumed, SessionCalibrate } from "./messages.ts";
+import type {
+  BodyEnd,
+  Checkpoint,
+  ClientMessage,
+  Frame,
+  Resumed,
+  SessionCalibrate,
+  SessionCalibrated,
+} from "./messages.ts";
 import { type Entry, Track } from "./track.ts";
 
 /** Messages kept over all bodies, beside unanswered frames: over a minute of two bodies at 30 Hz, about 8 MB. */
@@ -42,16 +52,16 @@ export class Log {
   idleS = Infinity;
   /** Bodies that began anew and have no estimate yet. */
   readonly anew = new Set<string>();
+  readonly calibrations: Calibrations;
   readonly #options: LogOptions;
   readonly #tracks = new Map<string, Track>();
   readonly #open = new FrameMap<Entry>(); // frames under way
-  #calibrate: Entry | undefined;
-  #held = ""; // the body whose frames the calibration rests on
   #place = 0;
   #stale: string[] = []; // bodies that the service resumed, and that are none any more
 
   constructor(options: LogOptions) {
     this.#options = options;
+    this.calibrations = new Calibrations(options.idles);
   }
 
   // --- what is sent --------------------------------------------------------------------------------------------------
@@ -59,17 +69,20 @@ export class Log {
   /** The frame with its body's label, where it brings none and the service has lost the one in force. */
   remind(frame: Frame & FrameKey): Frame & FrameKey {
     const track = this.#tracks.get(frame.body);
-    if (!track?.unlabelled || (frame.emotion ?? null) !== null) return frame;
+    if (!track?.unlabelled || (frame.emotion ?? null) !== null || this.#away(track, timeOf(frame))) return frame;
     return { ...frame, emotion: track.labelAt(timeOf(frame), this.#options.emotionTtlS) ?? null };
   }
 
   /** A frame was sent. */
   addFrame(frame: Frame & FrameKey): void {
+    this.calibrations.sent(frame, timeOf(frame));
     if (!this.#options.keeps) return;
     const track = this.#tracks.get(frame.body) ?? new Track();
     this.#tracks.set(frame.body, track);
-    this.#follow(track, frame);
+    const begins = this.#away(track, timeOf(frame));
+    this.#follow(track, frame, begins && track.here);
     const entry = this.#append(track, frame, frame.seq);
+    entry.begins = begins;
     track.unlabelled = false;
     if ((frame.emotion ?? null) !== null) entry.label = { emotion: frame.emotion!, given: timeOf(frame) };
     this.#open.set(frame, entry);
@@ -78,24 +91,30 @@ export class Log {
     if (kept > most + this.#open.size) this.#giveUpLongest(most);
   }
 
-  /** A body was reset; nothing to repeat where the service knows none of that name. */
-  addReset(body: string, message: ClientMessage): void {
+  /** A body was reset; whether to tell the service, which has nothing to reset of a body that it lost. */
+  addReset(body: string, message: ClientMessage): boolean {
     const track = this.#tracks.get(body);
     if (track?.here) this.#append(track, message);
+    return !this.#lost(body);
   }
 
-  /** A body has gone. */
-  addEnd(body: string, message: ClientMessage): void {
+  /** A body has gone; whether to tell the service, which knows no more of a body that it lost. */
+  addEnd(body: string, message: ClientMessage): boolean {
     const track = this.#tracks.get(body);
+    const lost = this.#lost(body);
     if (track?.here) this.#end(body, track, message);
+    else if (track !== undefined && lost) {
+      track.forget();
+      this.#bury(body, track);
+    }
+    if (lost) this.anew.delete(body);
+    return !lost;
   }
 
-  /** A calibration from a pose of `body` was asked for, in place of any before. */
-  addCalibrate(body: string, message: SessionCalibrate): void {
-    const before = this.#held;
-    this.#held = body;
-    this.#calibrate = this.#entry(message);
-    this.#buryByName(before);
+  /** A calibration was asked for. */
+  addCalibrate(message: SessionCalibrate, waiter: CalibrationWaiter): void {
+    this.calibrations.ask(message, this.#entry(message), waiter);
+    this.#buryAll();
   }
 
   // --- what comes ----------------------------------------------------------------------------------------------------
@@ -103,6 +122,7 @@ export class Log {
   /** These frames have their estimates; a `late` one changed nothing. */
   answered(keys: readonly FrameKey[], late: boolean): void {
     for (const key of keys) {
+      this.calibrations.estimated(key);
       const entry = this.#open.take(key);
       const track = this.#tracks.get(key.body);
       if (entry === undefined || track === undefined) continue;
@@ -118,6 +138,7 @@ export class Log {
     const track = this.#tracks.get(key.body);
     if (entry === undefined || track === undefined) return;
     track.refused(entry, forget);
+    if (forget && this.anew.has(key.body)) track.remindAgain();
     this.#bury(key.body, track);
   }
 
@@ -142,16 +163,18 @@ export class Log {
   }
 
   /** New terms are in force, and the bodies were reset: these checkpoints take the place of all before. */
-  calibrated(checkpoints: readonly Checkpoint[]): void {
-    this.calibrationFailed();
-    const renewed = new Set(checkpoints.filter((each) => this.checkpoint(each)).map(({ body }) => body));
+  calibrated(message: SessionCalibrated): void {
+    this.calibrations.calibrated(message);
+    this.#buryAll();
+    const renewed = new Set(message.checkpoints.filter((each) => this.checkpoint(each)).map(({ body }) => body));
     for (const [name, track] of this.#tracks) if (!renewed.has(name) && !track.untouched) track.giveUp();
   }
 
-  /** Nothing came of it. */
-  calibrationFailed(): void {
-    this.#calibrate = undefined;
-    this.#buryByName(this.#held);
+  /** Nothing came of one; whether there was one. */
+  calibrationFailed(body: string | null | undefined, error: InputError): boolean {
+    const failed = this.calibrations.failed(body, error);
+    this.#buryAll();
+    return failed;
   }
 
   // --- going on ------------------------------------------------------------------------------------------------------
@@ -189,7 +212,7 @@ export class Log {
   replay(): { messages: ClientMessage[]; echoes: FrameKey[] } {
     for (const [name, track] of this.#tracks) this.#prepare(name, track);
     const again = [...this.#tracks].flatMap(([body, track]) => track.entries.map((entry) => ({ entry, body })));
-    if (this.#calibrate !== undefined) again.push({ entry: this.#calibrate, body: "" });
+    again.push(...this.calibrations.entries.map((entry) => ({ entry, body: "" })));
     again.sort((one, other) => one.entry.place - other.entry.place);
     const echoes = again.flatMap(({ entry: { seq, answered }, body }) =>
       answered && seq !== undefined ? [{ body, seq }] : [],
@@ -204,7 +227,7 @@ export class Log {
     if (!track.whole) this.anew.add(name);
     track.beginAnew();
     const first = track.entries[0];
-    if (first !== undefined && this.anew.has(name)) this.#bringLabel(track, first);
+    if (first !== undefined && !first.begins && this.anew.has(name)) this.#bringLabel(track, first);
   }
 
   /** Let a body's first frame bring the label that was in force before it. */
@@ -220,7 +243,7 @@ export class Log {
 
   #entry(message: ClientMessage, seq?: number): Entry {
     this.#place += 1;
-    return { place: this.#place, message, seq, answered: false, ends: false };
+    return { place: this.#place, message, seq, answered: false, begins: false, ends: false };
   }
 
   #append(track: Track, message: ClientMessage, seq?: number): Entry {
@@ -229,16 +252,28 @@ export class Log {
     return entry;
   }
 
+  /** Whether the service lost a body, and nothing of it was sent since. */
+  #lost(body: string): boolean {
+    return this.anew.has(body) && !this.#tracks.get(body)?.here;
+  }
+
+  /** Whether a body's last frame is so long ago that the service has forgotten it. */
+  #away(track: Track, time: number): boolean {
+    return this.#options.idles && track.last > -Infinity && time - track.last > this.idleS;
+  }
+
   /**
-   * Note where a body stands, and which others the service forgets for it.
+   * Note where a body stands, and which others the service forgets for it; `back`: it was forgotten itself.
    *
    * A frame that is refused later counts here too: only if it is the first of a body that was away, and the stream is
    * then cut before the next, can a flag `gap_reset` differ.
    */
-  #follow(track: Track, frame: Frame): void {
+  #follow(track: Track, frame: Frame & FrameKey, back: boolean): void {
     const time = timeOf(frame);
-    const back = track.here && this.#options.idles && time - track.last > this.idleS;
-    if (back) Object.assign(track, { newest: -1, last: -Infinity });
+    if (back) {
+      this.calibrations.gone(frame.body);
+      Object.assign(track, { newest: -1, last: -Infinity });
+    }
     if (this.#options.idles && (back || !track.here)) this.#forgetIdle(track, time);
     track.here = true;
     const late = track.last - time >= 0 && track.last - time <= STEP_BACK_S;
@@ -254,18 +289,18 @@ export class Log {
   }
 
   #end(name: string, track: Track, message: ClientMessage): void {
+    this.calibrations.gone(name);
     track.end(this.#append(track, message));
     this.#bury(name, track);
   }
 
-  #buryByName(name: string): void {
-    const track = this.#tracks.get(name);
-    if (track !== undefined) this.#bury(name, track);
+  #buryAll(): void {
+    for (const [name, track] of this.#tracks) this.#bury(name, track);
   }
 
   #bury(name: string, track: Track): void {
-    if (this.#calibrate !== undefined && name === this.#held) return; // it rests on them, even if the body has gone
-    track.bury();
+    if (this.calibrations.holds(name)) return; // it rests on them, even if the body has gone
+    if (track.bury()) this.anew.delete(name);
     if (track.entries.length === 0 && !track.here && track.token === "" && !track.unlabelled) this.#tracks.delete(name);
   }
 

@@ -5,6 +5,9 @@ import type { ClientMessage, Frame } from "./messages.ts";
 /** Seconds that a service holds probabilities for, unless told otherwise. */
 export const ANALYSER_TTL_S = 2;
 
+/** The label of nobody knows what. */
+const UNKNOWN = "unknown";
+
 /** A label or a probability per emotion. */
 export type Emotion = NonNullable<Frame["emotion"]>;
 
@@ -24,6 +27,8 @@ export interface Entry {
   answered: boolean;
   /** The label that it brought. */
   label?: Label | undefined;
+  /** A frame after so long that the service had forgotten the body. */
+  begins: boolean;
   /** The body is gone with it. */
   ends: boolean;
 }
@@ -54,18 +59,18 @@ export class Track {
     return this.whole && this.token === "" && !this.entries.some((entry) => entry.answered);
   }
 
-  /** The label in force at `time`, before any frame under way. */
+  /** The label in force at `time`, before any frame under way; undefined: the one that new bodies have. */
   labelAt(time: number, ttlS: number | null | undefined): Emotion | undefined {
     if (this.#label === undefined) return undefined;
     const { emotion, given } = this.#label;
     const held = ttlS || (typeof emotion === "string" ? Infinity : ANALYSER_TTL_S);
-    return time <= given + held ? emotion : undefined;
+    return time <= given + held ? emotion : UNKNOWN;
   }
 
   /** A frame has its estimate. */
   answered(entry: Entry): void {
     entry.answered = true;
-    this.#label = entry.label ?? this.#label;
+    this.#label = entry.label ?? (entry.begins ? undefined : this.#label);
     if (!this.whole) this.#dropBefore(entry);
   }
 
@@ -73,6 +78,19 @@ export class Track {
   refused(entry: Entry, forget: boolean): void {
     entry.answered = true;
     if (forget) this.entries = this.entries.filter((each) => each !== entry);
+  }
+
+  /** The frame that brought the label again may have been refused: the next one is to bring it. */
+  remindAgain(): void {
+    this.unlabelled = this.#label !== undefined;
+  }
+
+  /** The life that the service lost has ended: the next one has nothing of it. */
+  forget(): void {
+    this.#label = undefined;
+    this.unlabelled = false;
+    this.newest = -1;
+    this.last = -Infinity;
   }
 
   /** A checkpoint covers all up to this entry. */
@@ -107,16 +125,19 @@ export class Track {
     this.#endings += 1;
   }
 
-  /** Drop the lives of this body that have ended and whose frames are all answered. */
-  bury(): void {
+  /** Drop the lives of this body that have ended and whose frames are all answered; whether there was one. */
+  bury(): boolean {
+    let buried = false;
     while (this.#endings > 0) {
       const life = this.entries.findIndex((entry) => entry.ends) + 1;
-      if (this.entries.slice(0, life).some((entry) => entry.seq !== undefined && !entry.answered)) return;
+      if (this.entries.slice(0, life).some((entry) => entry.seq !== undefined && !entry.answered)) break;
+      buried = true;
       this.#drop(life);
       this.token = "";
       this.seq = -1;
       this.whole = true;
     }
+    return buried;
   }
 
   /** Drop the oldest entries; where a life ends with them, only labels that were given since are in force. */

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import fc from "fast-check";
 import { CheckpointUnknown, Unreachable } from "../src/errors.ts";
-import type { Estimate } from "../src/messages.ts";
+import type { Estimate, SessionCalibrated } from "../src/messages.ts";
 import { Robot, type RobotOptions } from "./robot.ts";
 
 type Action =
@@ -16,6 +16,9 @@ const LONGEST = 150;
 
 /** So brief that nobody is away for long in the longest story. */
 const BRIEF = [0.02, 0.06]; // seconds; LONGEST of them are less than IDLE_S
+
+/** How long a pose is held: short stories have such, and another may be asked for before. */
+const HELD_S = 0.2;
 
 const body = fc.constantFrom("ann", "bob", "cyd");
 
@@ -57,9 +60,9 @@ function actions(odd: keyof typeof kinds): fc.Arbitrary<Action[]> {
 class Story {
   readonly robot: Robot;
   readonly #cuts: boolean;
-  #asked = false;
   time = 0;
-  calibrated = 0;
+  /** What came of each calibration, in the order of requests. */
+  readonly calibrated: string[] = [];
 
   constructor(options: RobotOptions, cuts: boolean) {
     this.robot = new Robot({ emotion: "joy", ...options });
@@ -81,9 +84,10 @@ class Story {
     } else if (action.kind === "reset") robot.conversation.resetBody(action.body);
     else if (action.kind === "end") robot.conversation.endBody(action.body);
     else if (action.kind === "calibrate") {
-      if (this.#asked) return; // another one would take the place of the first, where that is not answered yet
-      this.#asked = true;
-      robot.conversation.calibrate({ body: action.body }, { resolve: () => this.calibrated++, reject: () => {} });
+      const number = this.calibrated.push("no answer") - 1;
+      const came = (what: string) => this.calibrated.splice(number, 1, what);
+      const resolve = (found: SessionCalibrated) => came(JSON.stringify(found));
+      robot.conversation.calibrate({ body: action.body, seconds: HELD_S }, { resolve, reject: (e) => came(e.message) });
     } else if (action.kind !== "cut") robot[action.kind]();
     else if (this.#cuts && robot.conversation.linked) robot.cut();
   }
@@ -107,7 +111,7 @@ for (const encoding of ["json", "msgpack"] as const) {
           const whole = new Story({ encoding }, false).play(told);
           const torn = new Story({ encoding }, true).play(told);
           assert.deepEqual(torn.told(), whole.told());
-          assert.equal(torn.calibrated, whole.calibrated);
+          assert.deepEqual(torn.calibrated, whole.calibrated);
           assert.equal(torn.robot.conversation.inFlight, 0);
           assert.equal(torn.robot.conversation.state, "open");
         }),
@@ -164,8 +168,8 @@ test("a cut right after session.calibrated leaves every body where it was", () =
   const robot = new Robot();
   for (const seq of [4, 6, 5]) robot.frame(1, { body: "bob", seq, t: seq / 100, emotion: "fear" });
   let calibrated = false;
-  robot.conversation.calibrate({ body: "ann" }, { resolve: () => (calibrated = true), reject: () => {} });
-  for (const t of [0.1, 0.2, 0.3]) robot.frame(1, { body: "ann", t });
+  robot.conversation.calibrate({ body: "ann", seconds: 0.2 }, { resolve: () => (calibrated = true), reject: () => {} });
+  for (const t of [0.1, 0.2, 0.31]) robot.frame(1, { body: "ann", t });
   for (let moves = 0; !calibrated; moves++) {
     assert.ok(moves < 50);
     robot.send();
@@ -213,7 +217,7 @@ test("a label given while a calibration waited outlives the checkpoint", () => {
   const robot = new Robot();
   robot.frame(1, { body: "ann", t: 0 });
   robot.settle();
-  robot.conversation.calibrate({ body: "ann" }, { resolve: () => {}, reject: () => {} });
+  robot.conversation.calibrate({ body: "ann", seconds: 0.2 }, { resolve: () => {}, reject: () => {} });
   robot.conversation.endBody("ann");
   robot.frame(1, { body: "ann", t: 0.1, emotion: "fear" });
   for (const t of [0.2, 0.3]) robot.frame(1, { body: "ann", t });
@@ -225,6 +229,52 @@ test("a label given while a calibration waited outlives the checkpoint", () => {
   robot.settle();
   const { emotion, flags } = robot.read().at(-1)!;
   assert.deepEqual([emotion, flags], ["fear", ["reset"]]);
+});
+
+test("calibrations are told apart, and those that another took the place of are told so", () => {
+  const robot = new Robot();
+  const came: string[] = [];
+  const ask = (body: string) => {
+    const resolve = () => void came.push(`${body} is calibrated`);
+    robot.conversation.calibrate({ body, seconds: 0.2 }, { resolve, reject: ({ message }) => void came.push(message) });
+  };
+  ask("nobody");
+  ask("ann");
+  assert.deepEqual(came, ["another calibration took the place of this one"]);
+  for (const t of [0.1, 0.31]) robot.frame(1, { body: "ann", t });
+  ask("bob");
+  robot.cut(); // before any answer: both are asked again
+  for (const t of [0.4, 0.61]) robot.frame(1, { body: "bob", t });
+  robot.settle();
+  assert.deepEqual(came.slice(1), ["ann is calibrated", "bob is calibrated"]);
+});
+
+test("a lost body that ends and comes back is a new one, and no end is told to a service that knows of none", () => {
+  const robot = new Robot({ emotion: "joy" });
+  for (const t of [0, 0.1, 0.2]) robot.frame(1, { body: "ann", t, emotion: "fear" });
+  robot.settle();
+  robot.key = "another one";
+  robot.cut();
+  robot.settle();
+  assert.deepEqual(robot.reconnects.at(-1)?.anew, ["ann"]);
+  robot.conversation.resetBody("ann");
+  robot.conversation.endBody("ann");
+  robot.frame(1, { body: "ann", t: 0.3 });
+  robot.settle();
+  const { emotion, flags } = robot.read().at(-1)!;
+  assert.deepEqual([emotion, flags, robot.errors], ["joy", [], []]);
+});
+
+test("a lost body that comes back after long is a new one", () => {
+  const robot = new Robot({ emotion: "joy" });
+  robot.frame(1, { body: "ann", t: 0, emotion: "fear" });
+  robot.settle();
+  robot.key = "another one";
+  robot.cut();
+  robot.settle();
+  robot.frame(1, { body: "ann", t: 30 });
+  robot.settle();
+  assert.equal(robot.read().at(-1)!.emotion, "joy");
 });
 
 test("beyond the most that is kept a body is given up, with a warning, and goes on from its next checkpoint", () => {

@@ -6,7 +6,6 @@ import { pack, unpack } from "../src/msgpack.ts";
 
 export const IDLE_S = 10;
 const CHECKPOINT_S = 0.5;
-const CALIBRATION_FRAMES = 3;
 
 interface Body {
   digest: number;
@@ -28,7 +27,7 @@ export class ServiceModel {
   #label = "unknown";
   #terms = "";
   #name = "";
-  #held: { body: string; left: number } | undefined;
+  #held: { body: string; seconds: number; first?: number; frames: number } | undefined;
 
   /** Services with the same `key` take each other's checkpoints. */
   constructor(encoding: Encoding, key: string, latest = false) {
@@ -54,7 +53,7 @@ export class ServiceModel {
       case "body.end":
         return this.#end(message.body);
       case "session.calibrate":
-        this.#held = { body: message.body ?? "0", left: CALIBRATION_FRAMES };
+        this.#held = { body: message.body ?? "0", seconds: message.seconds ?? 1, frames: 0 };
         return undefined;
       case "session.end":
         return this.#say({ type: "session.ended", reason: "", totals: {} as messages.Totals });
@@ -111,7 +110,7 @@ export class ServiceModel {
     const flags = late ? ["late"] : body.flag ? [body.flag] : [];
     if (!late) body.flag = "";
     this.#answer({ body: name, seq, t: time, intensity: body.digest / 2 ** 32, emotion: body.label, flags });
-    this.#calibrate(name);
+    this.#calibrate(name, time, late);
     if (time - body.told >= CHECKPOINT_S && this.#held?.body !== name) this.#say(this.#checkpoint(name, body, time));
   }
 
@@ -145,10 +144,12 @@ export class ServiceModel {
     this.#say({ type: "estimate", level: "weak", status: "ok", by_emotion: null, ...fields } as messages.Estimate);
   }
 
-  #calibrate(name: string): void {
-    if (this.#held?.body !== name) return;
-    this.#held.left -= 1;
-    if (this.#held.left > 0) return;
+  #calibrate(name: string, time: number, late: boolean): void {
+    if (late || this.#held?.body !== name) return;
+    this.#held.first ??= time;
+    this.#held.frames += 1;
+    if (time - this.#held.first < this.#held.seconds) return;
+    const { frames } = this.#held;
     this.#held = undefined;
     const spec = { name: this.#name, joints: ["a"], parents: [-1], segments: {}, title: `after ${this.#terms.length}` };
     this.#terms = JSON.stringify(spec);
@@ -156,7 +157,7 @@ export class ServiceModel {
       Object.assign(body, { digest: this.#terms.length, flag: "reset" });
       return this.#checkpoint(other, body, body.last);
     });
-    const found = { skeleton: spec, frames: CALIBRATION_FRAMES, spread_deg: 0, unseen: [] };
+    const found = { skeleton: spec, frames, spread_deg: 0, unseen: [] };
     this.#say({ type: "session.calibrated", ...found, checkpoints });
   }
 
@@ -179,7 +180,7 @@ export class ServiceModel {
 
   /** A body is gone, and with it the calibration that its pose was held for; one that waits for it goes on to. */
   #letGo(name: string): void {
-    if (this.#held?.body !== name || this.#held.left === CALIBRATION_FRAMES) return;
+    if (this.#held?.body !== name || this.#held.first === undefined) return;
     this.#held = undefined;
     this.#say({ type: "error", code: "bad_input", message: "it is gone", fatal: false, body: name } as messages.Error);
   }

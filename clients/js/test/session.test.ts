@@ -213,7 +213,7 @@ test("a session is closed while it is cut, at once", async (t) => {
 
 test("a calibration resolves with the skeleton, and times out without frames", async (t) => {
   const { session } = await talk(t);
-  const found = session.calibrate({ seconds: 0.3 });
+  const found = session.calibrate({ seconds: 0.2 });
   for (let seq = 0; seq < 3; seq++) await session.send(POSE, { t: seq / 10 });
   assert.equal((await found).frames, 3);
   await assert.rejects(session.calibrate({ timeoutS: 0.01 }), { name: "TimeoutError" });
