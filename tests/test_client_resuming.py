@@ -414,6 +414,21 @@ def test_a_lost_body_is_told_its_label_again_where_the_frame_that_brought_it_was
     assert named(robot.read())[5:] == [(6, "fear"), (7, "fear")]
 
 
+def test_no_old_label_takes_the_place_of_a_new_one_that_is_under_way():
+    made = services_that_lose()
+    robot = Robot(lambda: next(made))
+    frames(robot, range(5), emotion="fear")
+    robot.cut()
+    robot.settle()
+    robot.conversation.frame(POSES[5] * 9.0, body="ann", t=5 / 30)
+    robot.conversation.frame(POSES[6], body="ann", t=6 / 30, emotion="pride")
+    while not robot.errors:
+        for what in ("send", "listen", "hear"):
+            robot.step(what)
+    frames(robot, [7])
+    assert named(robot.read())[5:] == [(6, "pride"), (7, "pride")]
+
+
 def test_a_lost_body_that_ends_and_comes_back_is_a_new_one():
     """The service has forgotten it already: it is told of no end, and nothing of before is told of the new life."""
     made = services_that_lose()

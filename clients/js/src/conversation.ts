@@ -275,7 +275,7 @@ export class Conversation extends Standing {
     const unsaid = lost && !estimate.flags.includes("reset");
     const settled = this.#answers.settle(unsaid ? { ...estimate, flags: ["reset", ...estimate.flags] } : estimate);
     if (!settled?.length) return;
-    this.#line.log.answered(settled, estimate.flags.includes("late"));
+    this.#line.log.answered(settled, estimate.flags);
     this.#line.progress();
   }
 

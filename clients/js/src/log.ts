@@ -119,10 +119,11 @@ export class Log {
 
   // --- what comes ----------------------------------------------------------------------------------------------------
 
-  /** These frames have their estimates; a `late` one changed nothing. */
-  answered(keys: readonly FrameKey[], late: boolean): void {
+  /** These frames have their estimates; a late one changed nothing, and a duplicate's may come before its turn. */
+  answered(keys: readonly FrameKey[], flags: readonly string[]): void {
+    const [late, repeated] = [flags.includes("late"), flags.includes("duplicate")];
     for (const key of keys) {
-      this.calibrations.estimated(key);
+      if (!repeated) this.calibrations.estimated(key);
       const entry = this.#open.take(key);
       const track = this.#tracks.get(key.body);
       if (entry === undefined || track === undefined) continue;

@@ -80,9 +80,9 @@ export class Track {
     if (forget) this.entries = this.entries.filter((each) => each !== entry);
   }
 
-  /** The frame that brought the label again may have been refused: the next one is to bring it. */
+  /** The frame that brought the label again may have been refused: the next one is to, if none did since. */
   remindAgain(): void {
-    this.unlabelled = this.#label !== undefined;
+    this.unlabelled = this.#label !== undefined && !this.entries.some(({ label }) => label);
   }
 
   /** The life that the service lost has ended: the next one has nothing of it. */

@@ -299,7 +299,7 @@ class Conversation(Standing):
                 estimate = estimate.model_copy(update={"flags": ("reset", *estimate.flags)})  # noqa: PLW2901
             settled = self._answers.settle(estimate)
             if settled:
-                self._line.log.answered(settled, late="late" in estimate.flags)
+                self._line.log.answered(settled, estimate.flags)
                 self._line.progress()
 
     def _calibrated(self, message: SessionCalibrated) -> None:

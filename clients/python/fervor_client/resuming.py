@@ -8,7 +8,7 @@ another appears; the same is done here, and repeated in a replay as `body.end`, 
 """
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from math import inf
 
 from fervor.errors import InputError
@@ -114,10 +114,12 @@ class Log:
 
     # --- what comes ---------------------------------------------------------------------------------------------------
 
-    def answered(self, keys: Iterable[Key], *, late: bool = False) -> None:
-        """These frames have their estimates; a `late` one changed nothing."""
+    def answered(self, keys: Iterable[Key], flags: Collection[str] = ()) -> None:
+        """These frames have their estimates; a late one changed nothing, and a duplicate's may come before its turn."""
+        late, repeated = "late" in flags, "duplicate" in flags
         for key in keys:
-            self.calibrations.estimated(key)
+            if not repeated:
+                self.calibrations.estimated(key)
             entry, track = self._open.pop(key, None), self._tracks.get(key[0])
             if entry is None or track is None:
                 continue
@@ -132,8 +134,8 @@ class Log:
         if entry is None or track is None:
             return
         track.refused(entry, forget=forget)
-        if forget and key[0] in self.anew:  # it may have been the one that brought the label again
-            track.unlabelled = track.label is not None
+        if forget and key[0] in self.anew:
+            track.remind_again()
         self._bury(key[0], track)
 
     def checkpoint(self, message: Checkpoint) -> bool:

@@ -80,6 +80,10 @@ class Track:
         if forget and entry in self.entries:
             self.entries.remove(entry)
 
+    def remind_again(self) -> None:
+        """The frame that brought the label again may have been refused: the next one is to, if none did since."""
+        self.unlabelled = self.label is not None and not any(entry.label for entry in self.entries)
+
     def drop_through(self, entry: Entry) -> None:
         """A checkpoint covers all up to this entry."""
         while self._drop_first() is not entry:
