@@ -85,6 +85,18 @@ def test_an_estimate_of_a_later_frame_tells_that_one_was_replaced_after_all(aski
     assert asking.calibrations.take(second) == FOUND
 
 
+def test_that_is_so_too_where_the_later_one_was_replaced_itself(asking: Asking):
+    first = asking.ask("ann")
+    asking.frames("ann", 0.0, 0.5)
+    asking.ask("bob")
+    asking.frames("bob", 0.6)
+    asking.ask("cyd")
+    assert asking.places == [1, 2, 3], "the second is asked again, lest the first be answered after all"
+    asking.calibrations.estimated(("bob", 600))
+    assert replaced(asking, first)
+    assert asking.places == [3]
+
+
 def test_a_failure_is_of_the_body_that_it_names(asking: Asking):
     first = asking.ask("ann")
     asking.frames("ann", 0.0, 0.5)

@@ -18,7 +18,7 @@ export interface CalibrationWaiter {
   reject(error: FervorError): void;
 }
 
-/** One that waits for its answer. */
+/** One that waits for its answer, or that one before it may have been replaced by. */
 interface Asked {
   readonly body: string;
   readonly seconds: number;
@@ -31,6 +31,8 @@ interface Asked {
   gone: boolean;
   /** Frames of all bodies since, before the next one was asked for; kept while others wait before it. */
   readonly since: FrameMap<true>;
+  /** By the next one. It is asked again while others wait before it, for it took the place of those. */
+  replaced: boolean;
 }
 
 /** Those of one conversation. */
@@ -50,21 +52,30 @@ export class Calibrations {
 
   /** Whether an answer may be on its way. */
   get decided(): boolean {
-    return this.#asked.some((asked) => this.#isDecided(asked));
+    return this.#waiting.some((asked) => this.#isDecided(asked));
   }
 
   /** Whether an answer may rest on frames of this body. */
   holds(body: string): boolean {
-    return this.#asked.some((asked) => asked.body === body);
+    return this.#waiting.some((asked) => asked.body === body);
   }
 
   /** One is asked for. */
   ask(request: SessionCalibrate, entry: Entry, waiter: CalibrationWaiter): void {
     const newest = this.#asked.at(-1);
-    if (newest !== undefined && !this.#isDecided(newest)) this.#keep(this.#asked.slice(0, -1));
-    const [body, seconds] = [request.body ?? "0", request.seconds ?? DEFAULT_S];
-    const since = new FrameMap<true>();
-    this.#asked.push({ body, seconds, entry, waiter, first: Infinity, last: -Infinity, gone: false, since });
+    if (newest !== undefined && !this.#isDecided(newest)) this.#replace(newest);
+    this.#asked.push({
+      body: request.body ?? "0",
+      seconds: request.seconds ?? DEFAULT_S,
+      entry,
+      waiter,
+      first: Infinity,
+      last: -Infinity,
+      gone: false,
+      since: new FrameMap(),
+      replaced: false,
+    });
+    this.#forget();
   }
 
   /** A frame is under way; `time` in seconds. */
@@ -86,26 +97,31 @@ export class Calibrations {
   /** A frame has its estimate: of those before the newest one at its time no answer comes any more. */
   estimated(key: FrameKey): void {
     const place = this.#asked.findIndex(({ since }) => since.has(key));
-    if (place > 0) this.#keep(this.#asked.slice(place));
+    for (const asked of this.#asked.slice(0, Math.max(place, 0))) this.#replace(asked);
+    this.#forget();
   }
 
   /** The oldest has its answer. */
   calibrated(message: SessionCalibrated): void {
-    this.#asked.shift()?.waiter.resolve({ ...message, checkpoints: [] });
+    const oldest = this.#asked.shift();
+    this.#forget();
+    oldest?.waiter.resolve({ ...message, checkpoints: [] });
   }
 
   /** One whose pose `body` held came to nothing, or the newest, which could not begin; whether there was one. */
   failed(body: string | null | undefined, error: InputError): boolean {
-    const asked = this.#asked.find((each) => each.body === body) ?? this.#asked.at(-1);
+    const waiting = this.#waiting;
+    const asked = waiting.find((each) => each.body === body) ?? waiting.at(-1);
     if (asked === undefined) return false;
     this.#asked = this.#asked.filter((each) => each !== asked);
+    this.#forget();
     asked.waiter.reject(error);
     return true;
   }
 
   /** Nothing will be answered any more. */
   abandon(error: FervorError): void {
-    for (const { waiter } of this.#asked.splice(0)) waiter.reject(error);
+    for (const { waiter, replaced } of this.#asked.splice(0)) if (!replaced) waiter.reject(error);
   }
 
   /** Whether the frames so far may be enough, if the service takes all; under clock `frames` times are the service's. */
@@ -113,10 +129,18 @@ export class Calibrations {
     return gone || (this.#timed ? last - first >= seconds : last > -Infinity);
   }
 
-  /** The others were replaced. */
-  #keep(left: Asked[]): void {
-    const replaced = this.#asked.filter((asked) => !left.includes(asked));
-    this.#asked = left;
-    for (const { waiter } of replaced) waiter.reject(new InputError("another calibration took the place of this one"));
+  get #waiting(): Asked[] {
+    return this.#asked.filter(({ replaced }) => !replaced);
+  }
+
+  #replace(asked: Asked): void {
+    if (asked.replaced) return;
+    asked.replaced = true;
+    asked.waiter.reject(new InputError("another calibration took the place of this one"));
+  }
+
+  /** Those that were replaced, unless others wait before them. */
+  #forget(): void {
+    while (this.#asked[0]?.replaced) this.#asked.shift();
   }
 }

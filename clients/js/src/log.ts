@@ -75,8 +75,11 @@ export class Log {
 
   /** A frame was sent. */
   addFrame(frame: Frame & FrameKey): void {
-    this.calibrations.sent(frame, timeOf(frame));
-    if (!this.#options.keeps) return;
+    if (this.#options.keeps) this.#keep(frame);
+    this.calibrations.sent(frame, timeOf(frame)); // of a body that may be gone and back with it
+  }
+
+  #keep(frame: Frame & FrameKey): void {
     const track = this.#tracks.get(frame.body) ?? new Track();
     this.#tracks.set(frame.body, track);
     const begins = this.#away(track, timeOf(frame));

@@ -17,7 +17,7 @@ from fervor_client.track import Entry
 
 @dataclass(slots=True, eq=False)
 class _Asked:
-    """One that waits for its answer."""
+    """One that waits for its answer, or that one before it may have been replaced by."""
 
     number: int
     request: SessionCalibrate
@@ -28,6 +28,8 @@ class _Asked:
     """Its body was gone after it had begun."""
     since: set[Key] = field(default_factory=set)
     """Frames of all bodies since, before the next one was asked for; kept while others wait before it."""
+    replaced: bool = False
+    """By the next one. It is asked again while others wait before it, for it took the place of those."""
 
     def decided(self, *, timed: bool) -> bool:
         """Whether the frames so far may be enough, if the service takes all of them.
@@ -55,18 +57,19 @@ class Calibrations:
     @property
     def decided(self) -> bool:
         """Whether an answer may be on its way."""
-        return any(asked.decided(timed=self._timed) for asked in self._asked)
+        return any(asked.decided(timed=self._timed) for asked in self._waiting)
 
     def holds(self, body: str) -> bool:
         """Whether an answer may rest on frames of this body."""
-        return any(asked.request.body == body for asked in self._asked)
+        return any(asked.request.body == body for asked in self._waiting)
 
     def ask(self, request: SessionCalibrate, entry: Entry) -> int:
         """One is asked for; the number to take its answer by."""
         if self._asked and not self._asked[-1].decided(timed=self._timed):
-            self._keep(self._asked[:-1])
+            self._replace(self._asked[-1])
         self._number += 1
         self._asked.append(_Asked(self._number, request, entry))
+        self._forget()
         return self._number
 
     def sent(self, key: Key, time: float) -> None:
@@ -86,19 +89,24 @@ class Calibrations:
     def estimated(self, key: Key) -> None:
         """A frame has its estimate: of those before the newest one at its time no answer comes any more."""
         place = next((place for place, asked in enumerate(self._asked) if key in asked.since), 0)
-        self._keep(self._asked[place:])
+        for asked in self._asked[:place]:
+            self._replace(asked)
+        self._forget()
 
     def calibrated(self, message: SessionCalibrated) -> None:
         """The oldest has its answer."""
         if self._asked:
             self._found[self._asked.pop(0).number] = message.model_copy(update={"checkpoints": ()})
+            self._forget()
 
     def failed(self, body: str | None, error: InputError) -> bool:
         """One whose pose `body` held came to nothing, or the newest, which could not begin; whether there was one."""
-        named = [asked for asked in self._asked if asked.request.body == body] or self._asked[-1:]
+        waiting = self._waiting
+        named = [asked for asked in waiting if asked.request.body == body] or waiting[-1:]
         if named:
             self._asked.remove(named[0])
             self._found[named[0].number] = error
+            self._forget()
         return bool(named)
 
     def take(self, number: int) -> SessionCalibrated | None:
@@ -108,9 +116,16 @@ class Calibrations:
             raise found
         return found
 
-    def _keep(self, left: list[_Asked]) -> None:
-        """The others were replaced."""
-        for asked in self._asked:
-            if asked not in left:
-                self._found[asked.number] = InputError("another calibration took the place of this one")
-        self._asked = left
+    @property
+    def _waiting(self) -> list[_Asked]:
+        return [asked for asked in self._asked if not asked.replaced]
+
+    def _replace(self, asked: _Asked) -> None:
+        if not asked.replaced:
+            asked.replaced = True
+            self._found[asked.number] = InputError("another calibration took the place of this one")
+
+    def _forget(self) -> None:
+        """Those that were replaced, unless others wait before them."""
+        while self._asked and self._asked[0].replaced:
+            self._asked.pop(0)

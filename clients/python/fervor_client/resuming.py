@@ -72,9 +72,11 @@ class Log:
 
     def add_frame(self, frame: Frame, payload: Payload) -> None:
         """A frame was sent."""
-        self.calibrations.sent((frame.body, frame.seq), _time(frame))
-        if not self._keeps:
-            return
+        if self._keeps:
+            self._keep(frame, payload)
+        self.calibrations.sent((frame.body, frame.seq), _time(frame))  # of a body that may be gone and back with it
+
+    def _keep(self, frame: Frame, payload: Payload) -> None:
         track = self._tracks.setdefault(frame.body, Track())
         begins = self._away(track, _time(frame))
         self._follow(track, frame, back=begins and track.here)
