@@ -34,7 +34,7 @@ class Silent:
 
     agreement = None
 
-    def decode_raw(self, message) -> None:
+    def decode_frames(self, message) -> None:
         return None
 
     def take(self, message, raw, poses) -> None:

@@ -18,8 +18,8 @@ from fervor.engine.engine import Engine
 from fervor.errors import EngineError
 from fervor.model import Floats, Model, Outputs, default_model_path
 from fervor.protocol.codec import CODECS, Codec
-from fervor.protocol.messages import Frame, Limits, ModelInfo, SessionStart
-from fervor.protocol.raw_frame import RawFrame
+from fervor.protocol.lean_frame import LeanFrame, LeanFrames
+from fervor.protocol.messages import Limits, ModelInfo, SessionStart
 from fervor.session.events import Outcome, Reply, Said, Ticket
 from fervor.session.host import Host
 from fervor.session.poses import Read, read_poses
@@ -145,9 +145,9 @@ class _Crowd:
         self._frame += 1
         data = [payloads[place % len(payloads)] for place in range(len(self._sessions))]
         came = [each.decode() for each in data] if self._text else data
-        decode_raw, decode, encode = self._codec.decode_raw, self._codec.decode_client, self._codec.encode
+        decode, encode = self._codec.decode_frames, self._codec.encode
         with self.watch.on("decode"):
-            frames = [_frame(decode_raw(each) or decode(each)) for each in came]
+            frames = [_frame(decode(each)) for each in came]
             poses = read_poses(list(zip(self._agreements, frames, strict=True)))
         with self.watch.on("plan"):
             planned = [_plan(*each) for each in zip(self._sessions, frames, poses, strict=True)]
@@ -164,9 +164,9 @@ class _Crowd:
         assert len(answers) == len(self._sessions)
 
 
-def _plan(session: Session, frame: Frame | RawFrame, pose: Read) -> tuple[Ticket, Conclude]:
+def _plan(session: Session, frame: LeanFrame, pose: Read) -> tuple[Ticket, Conclude]:
     """A frame's ticket, and who takes its outcome: at once where nothing is unusual, as in a turn of the service."""
-    prompt = session.prompt(frame, [pose]) if isinstance(frame, RawFrame) else ()
+    prompt = session.prompt(frame, [pose])
     if prompt:
         return prompt[0], session.answer
     (ticket,) = (event for event in session.receive(frame, [pose]) if isinstance(event, Ticket))
@@ -178,8 +178,8 @@ def _plan(session: Session, frame: Frame | RawFrame, pose: Read) -> tuple[Ticket
     return ticket, conclude
 
 
-def _frame(message: object) -> Frame | RawFrame:
-    assert isinstance(message, Frame | RawFrame)
+def _frame(message: LeanFrame | LeanFrames | None) -> LeanFrame:
+    assert isinstance(message, LeanFrame)
     return message
 
 
