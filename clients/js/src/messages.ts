@@ -6,7 +6,7 @@
  */
 export type Raw = Uint8Array;
 /**
- * How strongly an emotion shows: weak below the threshold, strong from it on.
+ * How strongly an emotion shows: weak below the threshold, strong above, with hysteresis between.
  */
 export type Level = "weak" | "strong";
 /**
