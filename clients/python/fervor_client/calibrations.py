@@ -36,7 +36,7 @@ class _Asked:
 
         Under clock `frames` times are the service's: any frame may do.
         """
-        return self.gone or (self.first <= self.last - self.request.seconds if timed else self.last > -inf)
+        return self.gone or (self.last - self.first >= self.request.seconds if timed else self.last > -inf)
 
 
 class Calibrations:
