@@ -87,6 +87,16 @@ async def test_prompt_tickets_of_one_slot_run_in_their_order():
     assert together.sizes == [3, 3, 3, 3]
 
 
+async def test_slots_with_more_tickets_wait_until_all_have_had_their_turn():
+    engine = Counting(300)
+    done = await run_all(Batcher(engine), tickets(engine, 300, frames=3))
+    assert engine.sizes == [256, 256, 256, 132]
+    slots = [ticket.slot for ticket, _ in done]
+    assert all(sorted(slots[turn : turn + 300]) == list(range(300)) for turn in (0, 300, 600))
+    for slot in (0, 150, 299):
+        assert [ticket.seq for ticket, _ in done if ticket.slot == slot] == [0, 1, 2]
+
+
 async def test_a_slot_is_released_only_after_its_last_ticket():
     engine = Counting(1)
     batcher = Batcher(engine)
