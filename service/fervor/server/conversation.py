@@ -35,6 +35,9 @@ BYTES_A_FRAME = 1024
 """A message that can't be read uses up the pace of as many frames as it had room for."""
 
 
+_ANSWERS = (LeanEstimate, LeanEstimates)
+
+
 class Conversation(Life):
     """A session and its wire."""
 
@@ -192,7 +195,7 @@ class Conversation(Life):
     def _say(self, message: Said) -> None:
         """Send a message, in place of one that waits and says less."""
         encoded = self._codec.encode(message)
-        if isinstance(message, LeanEstimate | LeanEstimates):
+        if isinstance(message, _ANSWERS):
             self._outbox.put(encoded, topic=_topic(message) if self._latest else None)
             return
         topic: Hashable = None

@@ -7,8 +7,7 @@ run by the engine. Nobody waits for company: the turn is taken as soon as the lo
 import asyncio
 import logging
 from collections.abc import Sequence
-from itertools import islice
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 from fervor.engine.batcher import Batcher
 from fervor.errors import EngineError
@@ -42,6 +41,10 @@ class Taker(Protocol):
         """Answer a message whose tickets `prompt` gave; before anything else is taken. Never raises."""
 
 
+_Ready = tuple[Taker, str | bytes, LeanFrame | LeanFrames | None, Sequence[Read]]
+"""Who a message came to, the message, its lean frames if it has any, and their poses."""
+
+
 class Turn:
     """What came, in order."""
 
@@ -63,16 +66,17 @@ class Turn:
     def _take(self) -> None:
         came, self._came = self._came, []
         try:
-            together = _read(came)
+            ready = _read(came)
         except Exception:  # a fault of ours must cost nobody a message: then every session reads by itself
             log.exception("the frames of a turn could not be read together")
-            together = [_Ready(taker, message, None, ()) for taker, message in came]
-        while together:
-            together = self._pass(together)
+            ready = [(taker, message, None, ()) for taker, message in came]
+        while ready:
+            ready = self._pass(ready)
 
-    def _pass(self, ready: Sequence["_Ready"]) -> list["_Ready"]:
+    def _pass(self, ready: Sequence[_Ready]) -> list[_Ready]:
         """Take messages and run what they bring; returns those behind a prompt frame of the same session."""
         prompt: dict[Taker, Sequence[Ticket]] = {}
+        work: list[Ticket] = []
         later = []
         for each in ready:
             taker, message, lean, poses = each
@@ -80,19 +84,15 @@ class Turn:
                 later.append(each)
             elif lean and poses and (tickets := taker.prompt(lean, poses)):
                 prompt[taker] = tickets
+                work += tickets
             else:
                 taker.take(message, lean, poses)
-        outcomes = iter(self._batcher.run([ticket for tickets in prompt.values() for ticket in tickets]))
+        outcomes, at = self._batcher.run(work), 0
         for taker, tickets in prompt.items():
-            taker.answer(tickets, list(islice(outcomes, len(tickets))))
+            end = at + len(tickets)
+            taker.answer(tickets, outcomes[at:end])
+            at = end
         return later
-
-
-class _Ready(NamedTuple):
-    taker: Taker
-    message: str | bytes
-    lean: LeanFrame | LeanFrames | None
-    poses: Sequence[Read]
 
 
 def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
@@ -100,19 +100,15 @@ def _read(came: Sequence[tuple[Taker, str | bytes]]) -> list[_Ready]:
 
     Frames behind a `session.start` in the same turn have no agreement yet; their session reads them.
     """
-    decoded = [(taker, message, taker.decode_frames(message), taker.agreement) for taker, message in came]
-    frames = [
-        (agreement, frame)
-        for _, _, lean, agreement in decoded
-        if lean is not None and agreement is not None
-        for frame in _frames_of(lean)
-    ]
-    poses = iter(read_poses(frames))
-    return [
-        _Ready(taker, message, lean, list(islice(poses, len(_frames_of(lean)))) if lean and agreement else ())
-        for taker, message, lean, agreement in decoded
-    ]
-
-
-def _frames_of(lean: LeanFrame | LeanFrames) -> tuple[LeanFrame, ...]:
-    return (lean,) if isinstance(lean, LeanFrame) else lean.frames
+    frames: list[tuple[Agreement, LeanFrame]] = []
+    decoded = []
+    for taker, message in came:
+        lean, agreement, begin = taker.decode_frames(message), taker.agreement, len(frames)
+        if agreement is not None and lean is not None:
+            if isinstance(lean, LeanFrame):
+                frames.append((agreement, lean))
+            else:
+                frames += [(agreement, frame) for frame in lean.frames]
+        decoded.append((taker, message, lean, begin, len(frames)))
+    poses = read_poses(frames)
+    return [(taker, message, lean, poses[begin:end]) for taker, message, lean, begin, end in decoded]

@@ -23,11 +23,15 @@ def read_poses(frames: Sequence[tuple[Agreement, LeanFrame]]) -> list[Read]:
     by_layout: dict[Layout, list[int]] = {}
     for place, (agreement, _) in enumerate(frames):
         by_layout.setdefault(agreement.layout, []).append(place)
-    read: list[Read | None] = [None] * len(frames)
+    read: list[Pose | None] = [None] * len(frames)
     for layout, places in by_layout.items():
-        for place, pose in zip(places, _read_block(layout, [frames[place][1] for place in places]), strict=True):
+        poses = _read_block(layout, [frames[place][1] for place in places])
+        if len(by_layout) == 1:
+            read = poses
+            break
+        for place, pose in zip(places, poses, strict=True):
             read[place] = pose
-    return [pose or _plainly(*frames[place]) for place, pose in enumerate(read)]
+    return [_plainly(*frames[place]) if pose is None else pose for place, pose in enumerate(read)]
 
 
 def _read_block(layout: Layout, frames: Sequence[LeanFrame]) -> list[Pose | None]:
