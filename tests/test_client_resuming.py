@@ -471,8 +471,8 @@ def test_a_checkpoint_that_grew_old_does_not_cost_the_others_theirs():
     frames(robot, [0], body="bob")
     robot.now += 400.0
     clock[0] = 400.0
-    following = robot.service.session._following
-    following._host = replace(following._host, seal=lambda data: KEY.seal(data, 400.0))
+    issuer = robot.service.session._following._issuer
+    issuer._host = replace(issuer._host, seal=lambda data: KEY.seal(data, 400.0))
     frames(robot, range(390))
     robot.cut()
     robot.settle()

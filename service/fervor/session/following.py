@@ -13,7 +13,6 @@ from fervor.errors import EngineError, FervorError, FrameError, InputError
 from fervor.protocol.lean_estimate import LeanEstimate, LeanEstimates
 from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.protocol.messages import (
-    Checkpoint,
     Error,
     Frame,
     Resumed,
@@ -22,13 +21,12 @@ from fervor.protocol.messages import (
 )
 from fervor.session.body import Body
 from fervor.session.calibrator import Calibrator
-from fervor.session.checkpoint import Bond, pack
 from fervor.session.events import Event, Outcome, Pose, Release, Reply, Restore, Said, Ticket
 from fervor.session.groups import Groups
 from fervor.session.host import Host
+from fervor.session.issuer import Issuer
 from fervor.session.poses import Read
 from fervor.session.refusal import refusal
-from fervor.session.resuming import resume
 from fervor.session.roster import Roster
 from fervor.session.start import Agreement
 from fervor.session.under_way import UnderWay
@@ -54,7 +52,7 @@ class Following:
         self.agreement = agreement
         self._host = host
         self._counts = counts
-        self._bond: Bond | None = None  # of checkpoints, to the agreement; once one is needed
+        self._issuer = Issuer(host, agreement)
         self._roster = Roster(host.claim, most=host.limits.max_bodies, idle_s=idle_s)
         self._under_way = UnderWay()
         self._groups = Groups()
@@ -223,7 +221,7 @@ class Following:
             return (self._failed(ticket, body, outcome),)
         self._counts["estimates"] += 1
         estimate = body.conclude(ticket, outcome)
-        checkpoint = None if ticket.checkpoint is None else self._checkpoint(ticket, body, outcome)
+        checkpoint = None if ticket.checkpoint is None else self._issuer.issue(ticket, body, outcome)
         return (estimate,) if checkpoint is None else (estimate, checkpoint)
 
     # --- outcomes -----------------------------------------------------------------------------------------------------
@@ -262,7 +260,7 @@ class Following:
 
     def _follow(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> list[Event]:
         """What comes after a ticket's estimate: its checkpoint, and a calibration that ended with it."""
-        checkpoint = self._checkpoint(ticket, body, outcome)
+        checkpoint = self._issuer.issue(ticket, body, outcome)
         if ticket.group is None:
             said: list[Event] = [Reply(checkpoint)] if checkpoint else []
             group = self._calibrated.pop(ticket, None)
@@ -287,7 +285,7 @@ class Following:
 
     def resume(self, tokens: Sequence[str]) -> tuple[tuple[Resumed, ...], list[Restore]]:
         """Go on with the bodies of these tokens; see `fervor.session.resuming`."""
-        return resume(tokens, self._host, bond=self._bound(), roster=self._roster, terms=self.agreement.terms)
+        return self._issuer.resume(tokens, self._roster)
 
     def checkpoints(self, group: int | None = None) -> list[Event]:
         """Ask for a checkpoint of every body, after all that is under way and, if any, the answers of `group`.
@@ -305,19 +303,6 @@ class Following:
                 self._under_way.add(ticket, body)
                 tickets.append(ticket)
         return tickets
-
-    def _checkpoint(self, ticket: Ticket, body: Body, outcome: Outcome | EngineError) -> Checkpoint | None:
-        if isinstance(outcome, EngineError) or ticket.checkpoint is None or outcome.memory is None:
-            return None
-        if self._host.seal is None or ticket.source != self.agreement.terms.source:
-            return None  # after a calibration, a state before it belongs to terms that no longer hold
-        content = pack(self._bound(), body.bookkeeping(ticket), body.answers(), outcome.memory)
-        return Checkpoint(body=body.name, seq=ticket.checkpoint.newest_seq, token=self._host.seal(content))
-
-    def _bound(self) -> Bond:
-        if self._bond is None:
-            self._bond = Bond(self._host.model.sha256, self._host.fingerprint, self.agreement.digest)
-        return self._bond
 
     # --- bodies -------------------------------------------------------------------------------------------------------
 
@@ -352,7 +337,8 @@ class Following:
         if found is None:
             return []
         calibration, message = found
-        self.agreement, self._bond = self.agreement.aligned(calibration.skeleton), None
+        self.agreement = self.agreement.aligned(calibration.skeleton)
+        self._issuer = Issuer(self._host, self.agreement)
         for known in self._roster:
             known.adopt(self.agreement.terms)
         return self._tell_calibrated(ticket, message)
