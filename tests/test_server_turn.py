@@ -156,6 +156,22 @@ async def test_one_run_for_a_turn_and_none_for_nothing(batcher: Batcher) -> None
     assert all(len(talk.estimates()) == 1 for talk in talks)
 
 
+async def test_a_large_turn_is_answered_in_parts() -> None:
+    batcher = Batcher(Engine(model(), capacity=600))
+    turn, talks, said = Turn(batcher), [Talk(batcher) for _ in range(600)], []
+    first, second = frames(0, 2)
+    for message in (start(), first):
+        for talk in talks:
+            turn.put(talk, message)
+        await settle(batcher, turn)
+    batcher.watch(lambda run: said.append((run.size, sum(talk.estimates()[-1].seq for talk in talks))))
+    for talk in talks:
+        turn.put(talk, second)
+    await settle(batcher, turn)
+    assert said == [(256, 0), (256, 256), (88, 512)]
+    assert all(talk.estimates()[-1].seq == 1 for talk in talks)
+
+
 async def test_order_is_kept_between_frames_and_all_else(batcher: Batcher) -> None:
     turn, talk = Turn(batcher), Talk(batcher)
     first, second, third = frames(1, 3)

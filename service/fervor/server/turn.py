@@ -9,7 +9,7 @@ import logging
 from collections.abc import Sequence
 from typing import Protocol
 
-from fervor.engine.batcher import Batcher
+from fervor.engine.batcher import MOST_TICKETS, Batcher
 from fervor.errors import EngineError
 from fervor.protocol.lean_frame import LeanFrame, LeanFrames
 from fervor.session.events import Outcome, Ticket
@@ -65,6 +65,10 @@ class Turn:
 
     def _take(self) -> None:
         came, self._came = self._came, []
+        for first in range(0, len(came), MOST_TICKETS):  # so that the first of many need not wait for the last
+            self._take_together(came[first : first + MOST_TICKETS])
+
+    def _take_together(self, came: Sequence[tuple[Taker, str | bytes]]) -> None:
         try:
             ready = _read(came)
         except Exception:  # a fault of ours must cost nobody a message: then every session reads by itself
