@@ -19,6 +19,7 @@ from fervor.errors import EngineError, ModelFileError
 from fervor.metadata import METADATA_KEY, StateTensor
 from fervor.model import Model, check_row_independence, default_model_path
 from fervor.scoring import sequences
+from fervor.session.lanes import LANES
 from fervor.skeletons.rig import JOINTS, PARENTS
 from fervor_export.graph import build_model
 from networks import DEFAULT, frames, metadata, model_bytes, network
@@ -320,7 +321,7 @@ def test_one_row_that_differs_in_a_multiple_of_all_is_seen(model, size, row, tim
 
 def test_the_proof_covers_the_batches_that_are_run():
     covered = {name: of.default for name, of in inspect.signature(check_row_independence).parameters.items()}
-    assert covered["largest"] == engine.MOST_ROWS
+    assert covered["largest"] == engine.MOST_STEPS * LANES
     assert covered["together"] >= sequences.MOST_ROWS
 
 

@@ -87,7 +87,7 @@ def test_the_whole_chain_at_the_pace_of_life(live: Live) -> None:
 def test_a_robot_is_told(live: Live, short: Path) -> None:
     need_qi()
     with QiRobot(animations=("x",)) as robot:
-        ran = run("--robot", robot.url, "--service", live.stream, "--play", short, "--emotion", "sad")
+        ran = run("--robot", robot.url, "--service", live.stream, "--play", short, "--emotion", "joy")
         assert ran.returncode == 0, ran.stderr
         assert ["ALTextToSpeech", "setLanguage", "English"] in list(robot.calls_until("raiseEvent"))
 
