@@ -19,8 +19,7 @@ from fervor.errors import EngineError
 from fervor.model import Floats, Model, Outputs, default_model_path
 from fervor.protocol.codec import CODECS, Codec
 from fervor.protocol.lean_frame import LeanFrame, LeanFrames
-from fervor.protocol.messages import Limits, SessionStart
-from fervor.server.model_info import model_info
+from fervor.protocol.messages import Limits, ModelInfo, SessionStart
 from fervor.session.events import Outcome, Reply, Said, Ticket
 from fervor.session.host import Host
 from fervor.session.poses import Read, read_poses
@@ -186,7 +185,17 @@ def _frame(message: LeanFrame | LeanFrames | None) -> LeanFrame:
 
 def _host(model: Model, engine: Engine) -> Host:
     """A service without a wire."""
-    return Host(model_info(model), model.metadata, Limits(), model.fingerprint, engine.claim)
+    metadata = model.metadata
+    info = ModelInfo(
+        name=metadata.name,
+        version=metadata.version,
+        purpose=metadata.purpose,
+        sha256=model.sha256,
+        rate_hz=metadata.rate_hz,
+        emotions=metadata.emotions,
+        thresholds=metadata.levels.threshold,
+    )
+    return Host(info, metadata, Limits(), model.fingerprint, engine.claim)
 
 
 def _adapting(model: Model) -> Table:
