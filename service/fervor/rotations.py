@@ -285,15 +285,15 @@ def slerp(a: npt.NDArray[F], b: npt.NDArray[F], fraction: npt.NDArray[F] | float
     b = _turned_to(b, a)
     share = np.asarray(fraction, a.dtype)
     rest = 1.0 - share
-    angle = 2.0 * np.arctan2(length(a - b), length(a + b))  # between the 4-vectors, at most π/2
+    half = 0.5 * length(a - b)  # sine of half the angle between the 4-vectors, which is at most π/2
+    angle = 2.0 * np.arcsin(half)
+    sine = 2.0 * half * np.sqrt(1.0 - half * half)  # of the whole angle
+    left, right = np.sin(rest * angle), np.sin(share * angle)
     near = angle < 1e-6  # the sines cancel there: linear is exact
-    some_near = near.any()
-    safe = np.where(near, angle.dtype.type(1.0), angle) if some_near else angle
-    sine = np.sin(safe)
-    left, right = np.sin(rest * safe) / sine, np.sin(share * safe) / sine
-    if some_near:
+    if near.any():
+        sine = np.where(near, angle.dtype.type(1.0), sine)
         left, right = np.where(near, rest, left), np.where(near, share, right)
-    way = normalise(left[..., None] * a + right[..., None] * b)
+    way = (left / sine)[..., None] * a + (right / sine)[..., None] * b
     start, end = share == 0.0, share == 1.0
     return np.where(start[..., None], a, np.where(end[..., None], b, way)) if (start | end).any() else way
 

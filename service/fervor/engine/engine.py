@@ -5,7 +5,7 @@ depend on what else is in its batch: the model was checked for that at start-up,
 """
 
 from collections.abc import Iterator, Sequence
-from math import isnan
+from math import isfinite, isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fervor.emotions import EMOTIONS
 from fervor.engine.history import NO_HISTORY
 from fervor.engine.memory import BatchMemory, States
-from fervor.engine.posing import Poses, adapt_all, arrived, between, hold, reject_jumps
+from fervor.engine.posing import Poses, adapt_all, arrived, between, hold, on_the_way, reject_jumps
 from fervor.engine.slots import Slots
 from fervor.errors import EngineError
 from fervor.model import Floats, Model, Outputs
@@ -196,15 +196,22 @@ def _turn(steps: Sequence[Step], rows: npt.NDArray[np.intp], old: Poses, new: Po
     """Steps of these tickets [step], given the poses of all."""
     whole = len(rows) == len(new.rotations)
     after = new if whole else new.rows(rows)
-    if [step for step in steps if step.held or step.fraction < 1.0]:
-        fraction, held = np.array([step.fraction for step in steps]), np.array([step.held for step in steps])
-        rotations, mask = between(old if whole else old.rows(rows), after, fraction, held)
-    else:  # as of sensors that keep the grid's time
-        rotations, mask = arrived(after)
+    rotations, mask = _at(steps, old if whole else old.rows(rows), after)
     labels = b"".join([step.label.vector.tobytes() for step in steps])  # sooner done than np.stack
     emotion = np.frombuffer(labels, np.float32).reshape(len(steps), len(EMOTIONS))
     places = [step.lanes for step in steps]
     return _Turn(rows, steps, places, NO_LANES in places, rotations, mask, emotion)
+
+
+def _at(steps: Sequence[Step], old: Poses, new: Poses) -> tuple[Floats, Floats]:
+    """Rotations and mask at steps between these poses [step]; see `between`."""
+    fraction, held = [step.fraction for step in steps], [step.held for step in steps]
+    if True not in held:
+        if max(fraction) < 1.0:
+            return on_the_way(old, new, np.array(fraction))
+        if min(fraction) >= 1.0:  # as of sensors that keep the grid's time
+            return arrived(new)
+    return between(old, new, np.array(fraction), np.array(held))
 
 
 def _believed(
@@ -225,7 +232,7 @@ def _said(outputs: Outputs, rows: slice, time: int) -> npt.NDArray[np.float64]:
         EngineError: an intensity that is not finite.
     """
     intensity, by_emotion = outputs.intensity[rows, time, None], outputs.intensity_by_emotion[rows, time]
-    if not np.isfinite(intensity).all():
+    if not isfinite(np.add.reduce(intensity, axis=None)):  # one that is not makes the sum so
         raise EngineError("the model gave an intensity that is not finite; the body starts anew")
     return np.concatenate((intensity, by_emotion), axis=1, dtype=np.float64)
 
@@ -242,10 +249,7 @@ def _blend(
         by_lane = np.zeros((weight.size, said.shape[1]))
         by_lane[running] = said
     by_lane *= weight.reshape(-1, 1)
-    by_lane = by_lane.reshape(*weight.shape, -1)
-    blended = by_lane[:, 0]
-    for lane in range(1, LANES):
-        blended = blended + by_lane[:, lane]
+    blended: npt.NDArray[np.float64] = np.add.reduce(by_lane.reshape(*weight.shape, -1), axis=1)
     return blended
 
 

@@ -9,7 +9,6 @@ from fervor.engine.history import History
 from fervor.engine.posing import Poses
 from fervor.engine.slots import Slots
 from fervor.model import Floats
-from fervor.session.lanes import LANES
 from fervor.skeletons.rig import UPPER_BODY
 
 States = dict[str, Floats]  # name → [row, *shape]
@@ -17,7 +16,6 @@ States = dict[str, Floats]  # name → [row, *shape]
 Index = npt.NDArray[np.intp]
 
 
-_ALL_LANES = np.arange(LANES)
 _UPPER_BODY = np.array(UPPER_BODY)
 
 
@@ -49,12 +47,12 @@ class BatchMemory:
 
     def lanes(self, tickets: Index, lane: Index) -> Index:
         """The numbers of these lanes of tickets, both [row]: see `Slots.take`."""
-        return self._rows.take(tickets) * LANES + lane
+        numbers: Index = self._slots.lanes[self._rows.take(tickets), lane]
+        return numbers
 
     def all_lanes(self, tickets: Index) -> Index:
         """The numbers of all lanes of these tickets, ticket by ticket."""
-        at: Index = ((self._rows.take(tickets) * LANES)[:, None] + _ALL_LANES).reshape(-1)
-        return at
+        return self._slots.lanes.take(self._rows.take(tickets), axis=0).ravel()
 
     def take(self, at: Index, restart: Index | None = None) -> States:
         """Copies of the states of lanes, to be followed by `put`.

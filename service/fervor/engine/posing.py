@@ -126,6 +126,19 @@ def hold(new: Poses, old: Poses) -> Poses:
     return Poses(np.where(new.observed[..., None], new.rotations, old.rotations), new.observed)
 
 
+def on_the_way(
+    old: Poses, new: Poses, fraction: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """`between` where no pose has arrived yet and none is held, as is usual."""
+    rotations = slerp(old.rotations, new.rotations, fraction[:, None])
+    return rotations.astype(np.float32), (new.observed & old.observed).astype(np.float32)
+
+
+def arrived(new: Poses) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """`between` at the poses that came, for the whole batch."""
+    return new.rotations.astype(np.float32), new.observed.astype(np.float32)
+
+
 def between(
     old: Poses, new: Poses, fraction: npt.NDArray[np.float64], held: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
@@ -141,20 +154,9 @@ def between(
         rotations float32 [row, joint, 4] and mask float32 [row, joint]. Between two poses a joint counts as observed
         where both show it.
     """
-    there = fraction >= 1.0
-    rotations, observed = new.rotations.astype(np.float32), new.observed.copy()
-    on_the_way = np.flatnonzero(~there & ~held)
-    if len(on_the_way) == len(fraction):
-        observed &= old.observed
-        return slerp(old.rotations, new.rotations, fraction[:, None]).astype(np.float32), observed.astype(np.float32)
-    if len(on_the_way):
-        before, after = old.rows(on_the_way), new.rows(on_the_way)
-        rotations[on_the_way] = slerp(before.rotations, after.rotations, fraction[on_the_way, None])
-        observed[on_the_way] &= before.observed
-    rotations[held], observed[held] = old.rotations[held], False
-    return rotations, observed.astype(np.float32)
-
-
-def arrived(new: Poses) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """`between` at the poses that came, for the whole batch."""
-    return new.rotations.astype(np.float32), new.observed.astype(np.float32)
+    rotations, mask = arrived(new)
+    moving = np.flatnonzero((fraction < 1.0) & ~held)
+    if len(moving):
+        rotations[moving], mask[moving] = on_the_way(old.rows(moving), new.rows(moving), fraction[moving])
+    rotations[held], mask[held] = old.rotations[held], 0.0
+    return rotations, mask

@@ -77,6 +77,7 @@ class Slots:
         self.states = {
             state.name: np.zeros((capacity, LANES, *state.shape), np.float32) for state in metadata.states
         }  # name → [slot, lane, *shape]
+        self.lanes: npt.NDArray[np.intp] = np.arange(capacity * LANES).reshape(capacity, LANES)  # [slot, lane] number
         self._lanes = [_Lanes.of(name, state) for name, state in self.states.items()]
         self._kept: dict[str, npt.NDArray[Any]] = {
             "body": records.view(np.uint8).reshape(capacity, -1),
@@ -120,13 +121,13 @@ class Slots:
         self._records[slots] = records.view(_BYTES)
 
     def take(self, at: npt.NDArray[np.intp]) -> dict[str, npt.NDArray[np.float32]]:
-        """Copies of the states of lanes [row], each by its number slot · LANES + lane: name → [row, *shape]."""
+        """Copies of the states of lanes [row], each by its number in `lanes`: name → [row, *shape]."""
         return {name: values.take(at, axis=0) for name, values, _ in self._lanes}
 
     def put(self, at: npt.NDArray[np.intp], states: Mapping[str, npt.NDArray[np.float32]]) -> None:
-        """Make lanes [row] hold these states, name → [row, *shape]; see `take`."""
+        """Make lanes [row] hold these states, name → [row, *shape], in C order; see `take`."""
         for name, _, octets in self._lanes:
-            octets[at] = states[name].reshape(len(at), -1).view(octets.dtype)[:, 0]
+            octets[at] = np.frombuffer(states[name], octets.dtype)
 
     def recall(self, slot: int) -> Memory:
         """Copies of all that a slot holds."""
