@@ -5,6 +5,7 @@ Which frames are remembered follows from the frames alone, never from how far th
 a checkpoint has of it: those are needed every second, the answer itself hardly ever.
 """
 
+from collections import deque
 from collections.abc import Iterable
 
 import msgspec
@@ -43,9 +44,9 @@ class Answers:
 
     def __init__(self, body: str) -> None:
         self._body = body
-        self._newest: dict[int, None] = {}  # seqs, as planned, oldest first
+        self._newest: deque[int] = deque(maxlen=REMEMBERED)  # seqs, as planned
         self._under_way: dict[int, int] = {}  # seq → tickets
-        self._given: dict[int, bytes] = {}  # seq → answer, oldest first
+        self._given: deque[bytes] = deque(maxlen=REMEMBERED)  # answers, oldest first
 
     def expect(self, seq: int, *, new: bool = False) -> bool:
         """A frame comes; whether another one of this number is still under way, whose answer it shares.
@@ -54,14 +55,11 @@ class Answers:
             seq: its number.
             new: no frame had this number before.
         """
-        under_way, newest = self._under_way, self._newest
-        tickets = 0 if new else under_way.get(seq, 0)
-        if tickets and seq in newest:
+        tickets = 0 if new else self._under_way.get(seq, 0)
+        if tickets and seq in self._newest:
             return True
-        under_way[seq] = tickets + 1
-        newest[seq] = None
-        if len(newest) > REMEMBERED:
-            del newest[next(iter(newest))]
+        self._under_way[seq] = tickets + 1
+        self._newest.append(seq)
         return False
 
     @property
@@ -72,8 +70,7 @@ class Answers:
     @property
     def newest(self) -> LeanEstimate | None:
         """What was answered last; None before the first answer."""
-        kept = next(reversed(self._given.values()), None)
-        return None if kept is None else self._estimate(_decode(kept))
+        return self._estimate(_decode(self._given[-1])) if self._given else None
 
     def find(self, seq: int) -> LeanEstimate | None:
         """The answer that a frame of this number got; None if it is under way, forgotten or never came."""
@@ -81,32 +78,33 @@ class Answers:
 
     def give(self, estimate: LeanEstimate) -> None:
         """A frame is answered; in the order in which they came."""
-        seq, shares, given = estimate.seq, estimate.by_emotion, self._given
+        seq, shares = estimate.seq, estimate.by_emotion
         self._conclude(seq)
-        given[seq] = _encode(  # the fields of `_Kept`, in their order
-            (
-                seq,
-                estimate.t,
-                estimate.intensity,
-                estimate.level,
-                estimate.emotion,
-                estimate.status,
-                estimate.flags,
-                None if shares is None else tuple(shares.values()),
+        self._given.append(
+            _encode(  # the fields of `_Kept`, in their order
+                (
+                    seq,
+                    estimate.t,
+                    estimate.intensity,
+                    estimate.level,
+                    estimate.emotion,
+                    estimate.status,
+                    estimate.flags,
+                    None if shares is None else tuple(shares.values()),
+                )
             )
         )
-        if len(given) > REMEMBERED:
-            del given[next(iter(given))]
 
     def given(self, seq: int) -> LeanEstimate | None:
         """The answer to a frame that another one shares; None if that failed."""
-        kept = self._given.get(seq)
-        return None if kept is None else self._estimate(_decode(kept))
+        newest_first = map(_decode, reversed(self._given))  # a search is as rare as a frame that comes twice
+        return next((self._estimate(kept) for kept in newest_first if kept.seq == seq), None)
 
     def fail(self, seq: int) -> None:
         """A frame gets no answer; the same number may come again."""
         self._conclude(seq)
-        self._newest.pop(seq, None)
+        if seq in self._newest:
+            self._newest.remove(seq)
 
     def _conclude(self, seq: int) -> None:
         left = self._under_way.pop(seq, 1) - 1  # 1: of a frame that was to share an answer which never came
@@ -115,7 +113,7 @@ class Answers:
 
     def to_bytes(self) -> tuple[bytes, ...]:
         """All that was answered, oldest first; no bit is lost."""
-        return tuple(self._given.values())
+        return tuple(self._given)
 
     @classmethod
     def from_bytes(cls, body: str, kept: Iterable[bytes]) -> "Answers":
@@ -127,13 +125,12 @@ class Answers:
         answers = cls(body)
         for each in kept:
             try:
-                seq = _decode(each).seq
+                answers._newest.append(_decode(each).seq)
             except (msgspec.DecodeError, UnicodeError):
                 raise CheckpointUnknown(
                     "the checkpoint can't be read; expected a token as the service sent it"
                 ) from None
-            answers._newest[seq] = None
-            answers._given[seq] = each
+            answers._given.append(each)
         return answers
 
     def _estimate(self, kept: _Kept) -> LeanEstimate:
