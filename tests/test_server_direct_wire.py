@@ -11,9 +11,13 @@ from starlette.requests import HTTPConnection
 from websockets.server import ServerProtocol
 
 from bodies import motion
+from fervor.server.conversation import Conversation
 from fervor.server.direct_wire import DirectWire
 from fervor.server.http_protocol import GuardedHttp
 from fervor.server.websocket_protocol import GuardedWebSocket
+from fervor.session.body import Body
+from fervor.session.following import Following
+from fervor.session.session import Session
 from live import Live, RawClient, eventually, frames_of, running, talk
 
 FRAMES = frames_of(motion(20))
@@ -57,6 +61,31 @@ async def test_an_open_session_holds_nothing_of_its_handshake(service: Live) -> 
         await eventually(lambda: not service._server.server_state.tasks)
         assert len(wires(service)) == 6
         assert [thing for thing in held() if not any(thing is other for other in before)] == []
+
+
+OF_A_SESSION = (*OF_A_HANDSHAKE[:2], DirectWire, Conversation, Session, Following, Body)
+
+
+async def test_a_session_leaves_nothing_to_the_collector(service: Live) -> None:
+    """So that it may look seldom: what it finds it finds by stopping all streams."""
+
+    def left() -> list:
+        return [thing for thing in gc.get_objects() if issubclass(type(thing), OF_A_SESSION)]
+
+    gc.collect()
+    gc.disable()
+    try:
+        before = len(left())
+        for leaves in (True, False):
+            async with talk(service) as stream:
+                await stream.start(emotion="joy")
+                assert len(await stream.follow(FRAMES)) == len(FRAMES)
+                if leaves:
+                    await stream.send("session.end")
+                    assert (await stream.hear())["type"] == "session.ended"
+        await eventually(lambda: len(left()) <= before)
+    finally:
+        gc.enable()
 
 
 async def test_a_session_has_no_task_of_its_own(service: Live) -> None:

@@ -17,7 +17,7 @@ import pytest
 import websockets
 
 from bodies import motion
-from fervor.server.run import AddressError, Server, bind, configure, end_well, run
+from fervor.server.run import COLLECTED_AFTER, AddressError, Server, bind, configure, end_well, run
 from fervor.settings import Settings
 from live import PROTOCOL, Live, frames_of, score_request, talk
 from program import fervor, start_fervor
@@ -54,6 +54,7 @@ def test_an_unknown_host_is_told() -> None:
 
 def test_what_is_there_before_the_first_client_is_out_of_the_collectors_way(monkeypatch: pytest.MonkeyPatch) -> None:
     frozen: list[int] = []
+    usual = gc.get_threshold()
     monkeypatch.setattr("fervor.server.run.configure_logs", lambda *_: None)
     monkeypatch.setattr("fervor.server.run.end_well", lambda: None)
     monkeypatch.setattr(Server, "run", lambda *_, **__: frozen.append(gc.get_freeze_count()))
@@ -61,6 +62,9 @@ def test_what_is_there_before_the_first_client_is_out_of_the_collectors_way(monk
         run(Settings.load(port=0))
     finally:
         gc.unfreeze()
+        seldom = gc.get_threshold()
+        gc.set_threshold(*usual)
+    assert seldom == COLLECTED_AFTER
     assert frozen[0] > 10_000
 
 

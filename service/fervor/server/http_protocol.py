@@ -80,9 +80,10 @@ class GuardedHttp(HttpToolsProtocol):
         self._feed(rest)
 
     def handle_websocket_upgrade(self) -> None:
-        """From here on it is a WebSocket, which has timeouts of its own."""
+        """From here on it is a WebSocket, which has timeouts of its own; nothing of this object is left behind."""
         self._forget_deadline()
         super().handle_websocket_upgrade()
+        self.parser = None  # type: ignore[assignment]  # it calls us: a circle that only the collector could break
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002  # a sentence for logs
         """What came is not HTTP."""

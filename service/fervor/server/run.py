@@ -142,12 +142,19 @@ def run(settings: Settings) -> None:
             Supervisor(settings, bound, on_serving=say_where).run()
 
 
+COLLECTED_AFTER = (50_000, 20, 100)
+"""Objects more than before after which the collector looks at the new ones; how often it does until it looks further."""
+
+
 def leave_alone_what_is_loaded() -> None:
-    """Have the collector look at what comes from now on, and at that only.
+    """Have the collector look at what comes from now on, at that only, and seldom.
 
     Modules and the model stay to the end: it need not walk them beside live streams, and workers go on sharing them.
+    What a turn of many sessions makes is gone with the turn, and a session leaves no circles: with Python's own bounds
+    every large turn was walked, and every hundredth all bodies, for ten milliseconds.
     """
     gc.freeze()
+    gc.set_threshold(*COLLECTED_AFTER)
     gc.enable()  # `fervor serve` loads without it
 
 
