@@ -29,7 +29,7 @@ def test_a_pose_held_long_enough_is_told_once() -> None:
     found = calibrator.add(body.plan(15, 0.5, STILL), STILL)
     assert found is not None
     assert (found[1].frames, found[1].spread_deg) == (16, pytest.approx(0.0, abs=1e-6))
-    assert not calibrator.active
+    assert calibrator.under_way is None
 
 
 def test_a_pose_that_is_not_held_still_ends_it() -> None:
@@ -37,17 +37,17 @@ def test_a_pose_that_is_not_held_still_ends_it() -> None:
     moved = Pose(motion(1, seed=3, joints=25, speed=1.0)[0], ALL)
     with pytest.raises(InputError):
         calibrator.add(body.plan(15, 0.5, moved), moved)
-    assert not calibrator.active
+    assert calibrator.under_way is None
 
 
 def test_it_goes_with_its_body_and_waits_for_one_that_is_still_to_come() -> None:
     calibrator, _ = begun()
     assert calibrator.gone("adam") is None
     assert "was gone" in calibrator.gone("eve").message
-    assert not calibrator.active
+    assert calibrator.under_way is None
     waiting, _ = begun(frames=0)
     assert waiting.gone("eve") is None
-    assert waiting.active
+    assert waiting.under_way is not None
 
 
 def test_a_newcomer_ends_it_where_its_body_was_forgotten() -> None:

@@ -38,9 +38,9 @@ def test_a_forgotten_bodys_slot_goes_to_the_next_new_one_the_rest_is_released():
     see(people, "b", 0.0)
     assert see(people, "c", 20.0).slot in {0, 1}
     assert [body.name for body in people] == ["c"]
-    (rest,) = people.spare()
+    (rest,) = people.give_up_spare()
     assert rest.slot in {0, 1}
-    assert people.spare() == []
+    assert people.give_up_spare() == []
 
 
 def test_who_returns_after_long_is_a_new_body_that_says_so():

@@ -32,14 +32,14 @@ def test_outcomes_wait_for_those_of_earlier_tickets(order):
         assert set(range(len(left))) <= come
         assert len(left) not in come
     assert left == [0, 1, 2, 3, 4, 5]
-    assert not under_way
+    assert not under_way.tickets
 
 
 def test_the_outcomes_of_a_session_that_is_over_are_nobodys():
     body, (ticket,) = planned(1)
     under_way = UnderWay()
     under_way.add(ticket, body)
-    assert under_way
+    assert under_way.tickets
     under_way.clear()
-    assert not under_way
+    assert not under_way.tickets
     assert under_way.conclude(ticket, EngineError("late")) == []

@@ -53,7 +53,6 @@ class Body:
         "_enough",
         "_label",
         "_lanes",
-        "_last",
         "_level",
         "_next_checkpoint",
         "_pending",
@@ -64,6 +63,7 @@ class Body:
         "_timeline",
         "_window",
         "in_flight",
+        "last",
         "name",
         "newest_seq",
         "slot",
@@ -74,13 +74,14 @@ class Body:
         self.slot = slot
         self.in_flight = 0
         self.newest_seq = -1
+        self.last: float | None = None
+        """Time of its newest frame, with a pose or without, seconds on the client's clock."""
         self._terms = terms
         self._rule = terms.metadata.levels
         self._lanes = lane_plan(terms.metadata.rate_hz)
         self._window = window_steps(terms.memory, terms.metadata.rate_hz)
         self._label = label
         self._timeline: Timeline | None = None
-        self._last: float | None = None  # seconds, newest frame with a pose or without
         self._level: LevelState | None = None
         self._emotion = UNKNOWN
         self._pending: tuple[Flag, ...] = ()
@@ -89,11 +90,6 @@ class Body:
         self._put_off = False
         self._answers = Answers(name)
         self._enough = enough_joints(terms)
-
-    @property
-    def last(self) -> float | None:
-        """Time of its newest frame, seconds on the client's clock."""
-        return self._last
 
     @property
     def begun(self) -> bool:
@@ -148,7 +144,7 @@ class Body:
         if not late:
             self.newest_seq = seq
         if not flags or "late" not in flags:
-            self._last, self._label = time, label
+            self.last, self._label = time, label
         if moved.fresh and self._pending:
             flags, self._pending = (*self._pending, *flags), ()
         if lost:
@@ -213,7 +209,7 @@ class Body:
         body = cls(kept.name, slot, terms, Label(np.array(vector, np.float32), name, until))
         body.newest_seq = kept.newest_seq
         body._timeline = None if kept.timeline is None else Timeline(*kept.timeline)
-        body._last = kept.last
+        body.last = kept.last
         body._pending = kept.pending
         body._level = None if kept.level is None else LevelState(*kept.level)
         body._emotion = kept.emotion
@@ -227,7 +223,7 @@ class Body:
             name=self.name,
             newest_seq=self.newest_seq,
             timeline=None if line is None else (line.origin, line.last, line.steps),
-            last=self._last,
+            last=self.last,
             label=(tuple(label.vector.tolist()), label.name, label.until),
             pending=self._pending,
             level=None,

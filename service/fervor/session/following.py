@@ -67,7 +67,7 @@ class Following:
     @property
     def busy(self) -> bool:
         """Whether something is under way."""
-        return bool(self._under_way)
+        return bool(self._under_way.tickets)
 
     # --- frames -------------------------------------------------------------------------------------------------------
 
@@ -85,7 +85,7 @@ class Following:
         except FervorError as error:
             self._counts["rejected"] += 1
             events = [Reply(refusal(error, frame))]
-        return [*self._roster.spare(), *events] if self._roster.has_spare else events
+        return [*self._roster.give_up_spare(), *events] if self._roster.spare else events
 
     def frames(self, frames: Sequence[AnyFrame], poses: Sequence[Read]) -> list[Event]:
         """The work of a message of several.
@@ -134,7 +134,7 @@ class Following:
         if group is not None:
             self._groups.expect(group)
         self._note(ticket)
-        return [*gone, ticket, *self._calibrate(ticket, pose)] if gone or calibrator.active else [ticket]
+        return [*gone, ticket, *self._calibrate(ticket, pose)] if gone or calibrator.under_way else [ticket]
 
     def _answer_again(self, answer: LeanEstimate, group: int | None, place: int) -> list[Event]:
         self._counts["duplicate"] += 1
@@ -158,7 +158,7 @@ class Following:
 
         For a caller that runs them, and hands their outcomes to `answer`, before anything else of this session.
         """
-        if self._under_way or self._calibrator.active or self._roster.has_spare:
+        if self._under_way.tickets or self._calibrator.under_way is not None or self._roster.spare:
             return ()
         if isinstance(message, LeanFrame):
             body = self._usual(message, poses[0])

@@ -26,7 +26,8 @@ class Roster:
         self._most = most
         self._idle_s = idle_s
         self._bodies: dict[str, Body] = {}
-        self._spare: list[int] = []
+        self.spare: list[int] = []
+        """Slots of bodies that were forgotten, which nobody took over yet."""
 
     def __iter__(self) -> Iterator[Body]:
         return iter(self._bodies.values())
@@ -63,7 +64,7 @@ class Roster:
         self._forget_idle(time)
         if len(self._bodies) >= self._most:
             raise InputError(f"body {name!r} is one too many; this service takes {self._most} a session")
-        fresh = Body(name, self._spare.pop() if self._spare else self._claim(), terms, label())
+        fresh = Body(name, self.spare.pop() if self.spare else self._claim(), terms, label())
         if body is not None:
             fresh.reset("gap_reset")
         self._bodies[name] = fresh
@@ -81,21 +82,16 @@ class Roster:
         del self._bodies[name]
         return Release(body.slot)
 
-    @property
-    def has_spare(self) -> bool:
-        """Whether there is a slot that nobody took over."""
-        return bool(self._spare)
-
-    def spare(self) -> list[Release]:
+    def give_up_spare(self) -> list[Release]:
         """The slots that nobody took over."""
-        spare, self._spare = self._spare, []
+        spare, self.spare = self.spare, []
         return [Release(slot) for slot in spare]
 
     def clear(self) -> list[Release]:
         """All bodies are gone."""
         released = [Release(body.slot) for body in self._bodies.values()]
         self._bodies.clear()
-        return [*self.spare(), *released]
+        return [*self.give_up_spare(), *released]
 
     def _is_idle(self, body: Body, time: float) -> bool:
         return body.last is not None and time - body.last > self._idle_s
@@ -103,4 +99,4 @@ class Roster:
     def _forget_idle(self, time: float) -> None:
         for body in [body for body in self._bodies.values() if self._is_idle(body, time)]:
             del self._bodies[body.name]
-            self._spare.append(body.slot)
+            self.spare.append(body.slot)

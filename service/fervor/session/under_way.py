@@ -21,19 +21,17 @@ class UnderWay:
     """The tickets of one session."""
 
     def __init__(self) -> None:
-        self._tickets: dict[Ticket, tuple[Body, int]] = {}  # as they were planned
+        self.tickets: dict[Ticket, tuple[Body, int]] = {}
+        """With body and place in the message, as they were planned."""
         self._outcomes: dict[Ticket, Outcome | EngineError] = {}  # that wait for those of earlier tickets
-
-    def __bool__(self) -> bool:
-        return bool(self._tickets)
 
     def add(self, ticket: Ticket, body: Body, place: int = -1) -> None:
         """A ticket was planned, after all before."""
-        self._tickets[ticket] = body, place
+        self.tickets[ticket] = body, place
 
     def conclude(self, ticket: Ticket, outcome: Outcome | EngineError) -> list[Concluded]:
         """An outcome came: the tickets whose turn it is now, none if the session is over."""
-        tickets, outcomes = self._tickets, self._outcomes
+        tickets, outcomes = self.tickets, self._outcomes
         if ticket not in tickets:
             return []
         outcomes[ticket] = outcome
@@ -44,5 +42,5 @@ class UnderWay:
 
     def clear(self) -> None:
         """The session is over."""
-        self._tickets.clear()
+        self.tickets.clear()
         self._outcomes.clear()
