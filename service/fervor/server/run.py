@@ -143,7 +143,7 @@ def run(settings: Settings) -> None:
 
 
 COLLECTED_AFTER = (50_000, 20, 100)
-"""Objects more than before after which the collector looks at the new ones; how often it does until it looks further."""
+"""Objects more than before after which the collector looks at the new ones; how often, until it looks further back."""
 
 
 def leave_alone_what_is_loaded() -> None:
