@@ -32,9 +32,17 @@ def answer(message: dict[str, Any]) -> list[dict[str, Any]]:
 
 @contextmanager
 def speaking(said: Answer = answer) -> Iterator[Running]:
-    """Run it on a free port."""
+    """Run it on a free port; all sessions are answered by the same function."""
+    with speaking_to_each(lambda: said) as running:
+        yield running
+
+
+@contextmanager
+def speaking_to_each(conversation: Callable[[], Answer]) -> Iterator[Running]:
+    """Run it on a free port; every session is answered by a function made for it."""
 
     def converse(connection: ServerConnection) -> None:
+        said = conversation()
         for data in connection:
             text = isinstance(data, str)
             try:

@@ -158,19 +158,20 @@ def test_a_generator_that_was_held_up_says_so(workshop) -> None:
             build("load", workshop),
             script,
             address=(running.host, running.port),
-            load=load,
+            most=load.sessions,
+            arrivals=load.arrivals,
             settle=0,
             processor=min(os.sched_getaffinity(0)),
             result=workshop / "held-result",
         ) as generator:
-            generator.wait_until_ready()
+            generator.open(load.sessions)
             pid = generator._process.pid
 
             def hold_up() -> None:
                 os.kill(pid, signal.SIGSTOP)
                 threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
 
-            seen = generator.run(hold_up, lambda: None)
+            seen = generator.run(load, hold_up, lambda: None)
     trial = conclude(load, seen, None)
     assert trial.lag_p99_ms >= 100
     assert not trial.valid

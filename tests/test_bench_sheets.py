@@ -48,6 +48,7 @@ def standing(name: str, us: float, sessions: int, *, frames: int = 1, p50: float
         saturated=trial(us=us),
         capacity=Capacity(sessions, bounded=True),
         confirmed=trial(sessions),
+        search=(trial(sessions),),
         trials=(trial(100),),
         pauses=Pauses(10, 2, 1.5, 0.001) if name == "fervor" else None,
     )

@@ -1,13 +1,10 @@
 """What makes a trial count."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from fervor_bench.generator import Load, Seen
-from fervor_bench.traffic import Traffic
-from fervor_bench.trial import MOST_MESSAGES, Used, conclude, messages_needed, messages_to_settle
+from fervor_bench.trial import Used, conclude
 
 WINDOW = (10.0, 12.0)
 
@@ -21,9 +18,11 @@ def seen(**changes) -> Seen:
         "first_error": "",
         "frames": 1000,
         "unanswered": 0,
+        "under_way": 0,
         "checkpoints": 0,
         "blocked": 0,
         "dry": False,
+        "lost": False,
         "window_s": 2.0,
         "busy_s": 0.2,
         "latencies": np.full(1000, 500, np.float32),
@@ -50,7 +49,8 @@ def test_a_service_elsewhere_has_no_costs() -> None:
 @pytest.mark.parametrize(
     ("load", "changes", "used", "objection"),
     [
-        (Load(10), {"lags": np.full(1000, 1500, np.float32)}, Used(1.0, 1.0, WINDOW), "lagged"),
+        (Load(10), {"lags": np.full(1000, 2100, np.float32)}, Used(1.0, 1.0, WINDOW), "lagged"),
+        (Load(1, waits="spin"), {"lags": np.full(30, 1100, np.float32)}, Used(1.0, 1.0, WINDOW), "lagged"),
         (Load(10), {"busy_s": 1.96}, Used(1.0, 1.0, WINDOW), "98% of its processor"),
         (Load(10), {}, Used(1.0, 1.5, WINDOW), "others used 25% of the contestant's processor"),
         (Load(10, arrivals="lockstep"), {"lags": np.full(1000, 11000, np.float32)}, Used(1.0, 1.0, WINDOW), "lagged"),
@@ -70,19 +70,3 @@ def test_lockstep_and_closed_loops_are_judged_by_their_own_measure() -> None:
 @pytest.mark.parametrize("changes", [{"refused": 1}, {"closed": 1}, {"errors": 1}, {"frames": 0}])
 def test_sessions_that_were_not_served_are_failures(changes) -> None:
     assert not conclude(Load(10), seen(**changes), None).keeps(1e9)
-
-
-def test_messages_last_for_the_whole_run() -> None:
-    assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic()) == 6 * 30 + 1
-    assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic(frames_per_message=6)) == 31
-    assert messages_needed(Load(10, warmup_s=1, seconds=5), Traffic(bodies=4)) == 6 * 30 * 4 + 4
-    assert messages_needed(Load(1, loop="closed"), Traffic()) == MOST_MESSAGES
-
-
-@pytest.mark.parametrize(
-    ("bodies", "frames", "messages"), [(1, 1, 60), (1, 6, 10), (4, 1, 240), (4, 2, 120), (2, 4, 30)]
-)
-def test_what_goes_ahead_is_so_many_seconds_of_every_body(bodies: int, frames: int, messages: int) -> None:
-    load, traffic = Load(3, warmup_s=1, seconds=5, settle_s=2), Traffic(bodies=bodies, frames_per_message=frames)
-    assert messages_to_settle(load, traffic) == messages
-    assert messages_needed(load, traffic) == messages + messages_needed(replace(load, settle_s=0), traffic)

@@ -6,6 +6,12 @@ from dataclasses import dataclass
 MOST_P99_MS = 10.0
 """99 % of the frames must be answered within this: a third of a frame's interval at 30 Hz."""
 
+NEAR_P99_MS = 20.0
+"""A failure below this may be the machine's and is tried again; one above it is a failure."""
+
+STRIDE = 1.25
+"""From the first number tried to the next, up or down; it is squared each time until there is a bracket."""
+
 
 @dataclass(frozen=True, slots=True)
 class Capacity:
@@ -25,6 +31,8 @@ class Verdict:
     """The generator's lag is part of a latency, so what keeps with it would keep without."""
     valid: bool
     """A trial that fails proves nothing where the generator did."""
+    near: bool = False
+    """Whether it failed by so little that another trial may keep."""
 
 
 Judge = Callable[[int], Verdict]
@@ -44,15 +52,15 @@ def find_capacity(
 
     Args:
         judge: in a short trial.
-        first: where to begin.
+        first: where to begin: the nearer to the answer, the fewer trials.
         most: no more than so many.
         resolution: of the answer, as a share of it.
-        attempts: a number fails when so many trials in a row fail: neighbours on the machine cost some.
+        attempts: a number that fails is tried so often while its failures are near, or prove nothing.
         confirm: in a long trial; where it says no, it is asked for a number smaller by `resolution`, until it agrees.
     """
     found = _search(judge, first=first, most=most, resolution=resolution, attempts=attempts)
     while confirm is not None and found.sessions:
-        kept, sound = _try(confirm, found.sessions, attempts)
+        kept, sound = _try(confirm, found.sessions, attempts, near_too=False)
         if kept:
             break
         found = Capacity(min(int(found.sessions * (1.0 - resolution)), found.sessions - 1), bounded=sound)
@@ -60,7 +68,7 @@ def find_capacity(
 
 
 def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts: int) -> Capacity:
-    low, high, valid, number = 0, most + 1, False, min(max(first, 1), most)
+    low, high, valid, number, stride = 0, most + 1, False, min(max(first, 1), most), STRIDE
     while True:
         kept, sound = _try(judge, number, attempts)
         if kept:
@@ -69,10 +77,19 @@ def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts:
             high, valid = number, sound
         if high - low <= max(1, int(resolution * low)):
             return Capacity(low, bounded=valid and high <= most)
-        number = min(number * 2, most) if high > most else max((low + high) // 2, 1)
+        number, stride = _next(low, high, stride, most)
 
 
-def _try(judge: Judge, number: int, attempts: int) -> tuple[bool, bool]:
+def _next(low: int, high: int, stride: float, most: int) -> tuple[int, float]:
+    """The number to try, and the stride after it."""
+    if high > most:
+        return min(max(int(low * stride), low + 1), most), stride * stride
+    if low == 0:
+        return max(int(high / stride), 1), stride * stride
+    return (low + high) // 2, stride
+
+
+def _try(judge: Judge, number: int, attempts: int, *, near_too: bool = True) -> tuple[bool, bool]:
     """Whether a number is kept, and whether any failure was sound."""
     sound = False
     for _ in range(attempts):
@@ -80,4 +97,6 @@ def _try(judge: Judge, number: int, attempts: int) -> tuple[bool, bool]:
         if verdict.keeps:
             return True, True
         sound = sound or verdict.valid
+        if verdict.valid and not (verdict.near and near_too):
+            break
     return False, sound

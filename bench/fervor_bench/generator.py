@@ -1,6 +1,7 @@
 """The load generator as a process: started, ready, told to go, and asked what it saw."""
 
 import json
+import math
 import select
 import subprocess
 from collections.abc import Callable
@@ -43,6 +44,10 @@ class Load:
     """Seconds of the sensors' clocks that every session sends before it all, as fast as it is answered."""
     waits: Waits = "sleep"
     """How the generator waits: `spin` keeps its processor busy and times exact, `sleep` leaves room for others."""
+    backlog_s: float = math.inf
+    """Open loop: it is lost, and ends, where the frames of so many seconds wait for their answers."""
+    late_s: float = math.inf
+    """Open loop: likewise where 1 % of the window's frames are known to be answered later than this."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,11 +64,15 @@ class Seen:
     """Answered in the window."""
     unanswered: int
     """Frames due in the window that have no answer two seconds after it; open loop."""
+    under_way: int
+    """Frames of any time without an answer, and messages that could not be sent to their end."""
     checkpoints: int
     blocked: int
     """How often a session could not send because the service did not read."""
     dry: bool
     """The script came to its end before the window did."""
+    lost: bool
+    """The window ended early; see `Load`."""
     window_s: float
     busy_s: float
     """How long the generator had work: its processor time, or where it spins, what it was not waiting."""
@@ -72,7 +81,7 @@ class Seen:
 
 
 class Generator:
-    """One run of `load`, its sessions started and idle until `run`.
+    """A process `load`: sessions that are opened, and sent over in one run or several.
 
     As a context manager: whatever happens, the process is gone afterwards.
     """
@@ -83,7 +92,8 @@ class Generator:
         script: Path,
         *,
         address: tuple[str, int],
-        load: Load,
+        most: int,
+        arrivals: Arrivals,
         settle: int,
         processor: int,
         result: Path,
@@ -94,20 +104,18 @@ class Generator:
             program: the compiled `load`.
             script: what it sends, as `Traffic.write` makes it.
             address: host and port of the service.
-            load: how much, and when.
-            settle: messages of a session that go ahead of the schedule.
+            most: sessions that it will ever have at a time.
+            arrivals: of the messages, in open loops.
+            settle: messages of a session that go ahead of its first schedule.
             processor: to run on.
             result: the file for what it saw.
         """
-        self._load = load
         self._result = result
         host, port = address
-        where = [str(program), host, str(port), str(script), str(result)]
-        how = [str(load.sessions), load.loop, load.arrivals, load.waits]
-        times = [str(settle), str(load.warmup_s), str(load.seconds)]
+        words = [str(program), host, str(port), str(script), str(result), str(most), arrivals, str(settle)]
         with pinned(processor):
             self._process = subprocess.Popen(
-                [*where, *how, *times], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
             )  # no buffer: `select` must see every line that was not read
 
     def __enter__(self) -> Self:
@@ -116,30 +124,34 @@ class Generator:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the process, and its sessions with it."""
         self._process.kill()
         self._process.communicate()
 
-    def wait_until_ready(self) -> int:
-        """Wait for all sessions to be started; returns how many are.
+    def open(self, sessions: int) -> int:
+        """Have so many sessions, those of before among them, and wait for all to be started; returns how many are.
 
         Raises:
             BenchError: none is; says what the service answered.
         """
+        self._tell(f"open {sessions}")
         _, started, refused, *why = self._hear("ready", CONNECT_S).split(" ", 3)
         if int(started) == 0:
             raise BenchError(f"none of {refused} sessions could be started: {' '.join(why) or 'no answer'}")
         return int(started)
 
-    def run(self, at_begin: Callable[[], None], at_end: Callable[[], None]) -> Seen:
-        """Send; the two callbacks are called at the edges of the measured window.
+    def run(self, load: Load, at_begin: Callable[[], None], at_end: Callable[[], None]) -> Seen:
+        """Send over the sessions that are open; the two callbacks are called at the edges of the measured window.
 
         Raises:
             BenchError: the generator ended before its time.
         """
-        assert self._process.stdin is not None
-        with suppress(BrokenPipeError):
-            self._process.stdin.write(b"go\n")
-        patience = SETTLE_S + self._load.warmup_s + self._load.seconds + 30.0
+        times = (load.warmup_s, load.seconds, load.backlog_s, load.late_s)
+        self._tell(f"run {load.loop} {load.waits} {' '.join(map(str, times))}")
+        patience = SETTLE_S + load.warmup_s + load.seconds + 30.0
         if self._hear("", patience) == "begin":
             at_begin()
             self._hear("end", patience)
@@ -148,6 +160,11 @@ class Generator:
         with self._result.open("rb") as file:
             series = [np.fromfile(file, "<f4", int(np.fromfile(file, "<u8", 1)[0])) for _ in range(2)]
         return Seen(**told, latencies=series[0], lags=series[1])
+
+    def _tell(self, line: str) -> None:
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(f"{line}\n".encode())
 
     def _hear(self, beginning: str, seconds: float) -> str:
         assert self._process.stdout is not None

@@ -3,9 +3,10 @@
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from fervor_bench.capacity import NEAR_P99_MS
 from fervor_bench.contestant import CONTESTANTS, Contestant
 from fervor_bench.errors import BenchError
-from fervor_bench.generator import Arrivals, Load, Loop
+from fervor_bench.generator import Arrivals, Load, Loop, Waits
 from fervor_bench.traffic import Encoding, Traffic
 
 Encodings = Literal["json", "msgpack", "both"]
@@ -14,6 +15,12 @@ SETTLE_S = 4.2
 """After so long on a sensor's clock a body of the service has both of its states, and costs what it will."""
 
 WARMUP_S = 1.0
+
+SPIN_MOST = 1
+"""Up to so many sessions the generator spins."""
+
+BACKLOG_S = 0.25
+"""So far behind, a service has lost an open loop: what waits at 10 ms each is nobody's idea of in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +59,27 @@ class Plan:
         """One of the numbers of sessions; those that are not `settled` after connecting get there first."""
         seconds = self.seconds if seconds is None else seconds
         warmup_s = min(WARMUP_S, seconds / 2)
-        settle_s = 0.0 if settled else SETTLE_S
-        return Load(sessions, self.loop, self.arrivals, warmup_s, seconds, settle_s=settle_s, waits="spin")
+        return Load(
+            sessions,
+            self.loop,
+            self.arrivals,
+            warmup_s,
+            seconds,
+            settle_s=0.0 if settled else SETTLE_S,
+            waits="spin" if sessions <= SPIN_MOST or self.loop == "closed" else "sleep",
+            backlog_s=BACKLOG_S,
+        )
 
     def filled(self, sessions: int, *, settled: bool) -> Load:
         """The closed loop."""
-        return replace(self.load(sessions, settled=settled), loop="closed", warmup_s=min(0.5, self.seconds / 2))
+        load = replace(self.load(sessions, settled=settled), loop="closed", waits="spin")
+        return replace(load, warmup_s=min(0.5, self.seconds / 2))
+
+    def trial(self, sessions: int, *, seconds: float | None = None, settled: bool) -> Load:
+        """An open loop of which only one thing is asked: whether it is kept, or nearly."""
+        load = replace(self.load(sessions, seconds=seconds, settled=settled), loop="open")
+        waits: Waits = "spin" if sessions <= SPIN_MOST else "sleep"
+        return replace(load, waits=waits, late_s=NEAR_P99_MS / 1000.0)
 
     def entries(self) -> list[tuple[Contestant, Traffic]]:
         """Who runs with which traffic; a simple contestant gets what it understands.

@@ -1,10 +1,10 @@
 """All that is measured of one contestant with one kind of messages."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fervor_bench.capacity import MOST_P99_MS, Capacity, Verdict, find_capacity
+from fervor_bench.capacity import MOST_P99_MS, NEAR_P99_MS, Capacity, Verdict, find_capacity
 from fervor_bench.check import check_estimates
 from fervor_bench.contestant import PAUSES, Contestant, Running, started
 from fervor_bench.lone import Lone, measure_lone
@@ -14,7 +14,7 @@ from fervor_bench.plan import Plan
 from fervor_bench.traffic import Encoding, Traffic
 from fervor_bench.trial import Track, Trial
 
-FILL_SHARE = 0.7
+FILL_SHARE = 0.9
 """The search for the capacity begins at this share of what the saturated rate would carry."""
 
 Told = Callable[[str], None]
@@ -39,6 +39,8 @@ class Standing:
     capacity: Capacity | None
     confirmed: Trial | None
     """The longest trial of that many sessions."""
+    search: tuple[Trial, ...]
+    """All trials of the search, in order."""
     trials: tuple[Trial, ...]
     pauses: Pauses | None
     """Of the collector, in all open loops together."""
@@ -88,12 +90,14 @@ def measure(running: Running, track: Track, plan: Plan, *, told: Told, name: str
     told(f"{name}: saturated")
     saturated = track.run(running, plan.filled(plan.saturated, settled=settled))
     trials = []
-    for sessions in plan.sessions:
-        told(f"{name}: {sessions} sessions")
-        trials.append(track.run(running, plan.load(sessions, settled=settled)))
-    capacity, confirmed = None, None
-    if plan.most_sessions:
-        capacity, confirmed = _search(running, track, plan, saturated, told=told, name=name)
+    capacity: Capacity | None = None
+    search: list[Trial] = []
+    with track.keeping(running, max(plan.most_sessions, *plan.sessions, 1)):
+        for sessions in plan.sessions:
+            told(f"{name}: {sessions} sessions")
+            trials.append(track.run(running, plan.load(sessions, settled=settled)))
+        if plan.most_sessions:
+            capacity, search = _search(running, track, plan, saturated, told=told, name=name)
     return Standing(
         contestant=name,
         encoding=traffic.encoding,
@@ -104,7 +108,8 @@ def measure(running: Running, track: Track, plan: Plan, *, told: Told, name: str
         lone=lone,
         saturated=saturated,
         capacity=capacity,
-        confirmed=confirmed,
+        confirmed=_last_kept(capacity, search),
+        search=tuple(search),
         trials=tuple(trials),
         pauses=None,
     )
@@ -112,17 +117,15 @@ def measure(running: Running, track: Track, plan: Plan, *, told: Told, name: str
 
 def _search(
     running: Running, track: Track, plan: Plan, saturated: Trial, *, told: Told, name: str
-) -> tuple[Capacity, Trial | None]:
-    """The capacity, and the last trial that kept it."""
-    kept: dict[int, Trial] = {}
+) -> tuple[Capacity, list[Trial]]:
+    """The capacity, and the trials that found it."""
+    trials: list[Trial] = []
 
     def judge(sessions: int, seconds: float = plan.seconds) -> Verdict:
         told(f"{name}: does it keep {sessions} sessions?")
-        load = replace(plan.load(sessions, seconds=seconds, settled=running.states == 1), loop="open")
-        trial = track.run(running, load)
-        if trial.keeps(MOST_P99_MS):
-            kept[sessions] = trial
-        return Verdict(keeps=kept.get(sessions) is trial, valid=trial.valid)
+        trial = track.run(running, plan.trial(sessions, seconds=seconds, settled=running.states == 1))
+        trials.append(trial)
+        return Verdict(keeps=trial.keeps(MOST_P99_MS), valid=trial.valid, near=trial.keeps(NEAR_P99_MS))
 
     def confirm(sessions: int) -> Verdict:
         return judge(sessions, plan.confirm_s)
@@ -136,4 +139,10 @@ def _search(
         attempts=plan.attempts,
         confirm=confirm if plan.confirm_s else None,
     )
-    return found, kept.get(found.sessions)
+    return found, trials
+
+
+def _last_kept(capacity: Capacity | None, search: Sequence[Trial]) -> Trial | None:
+    """The last trial that kept the capacity."""
+    kept = [trial for trial in search if trial.keeps(MOST_P99_MS)]
+    return next((trial for trial in reversed(kept) if capacity and trial.load.sessions == capacity.sessions), None)

@@ -1,35 +1,27 @@
 """One measurement: a load on a running contestant, and what came of it."""
 
-import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 from fervor_bench.contestant import Running
-from fervor_bench.generator import Generator, Load, Seen
+from fervor_bench.fleet import Fleet
+from fervor_bench.generator import Load, Seen
 from fervor_bench.latency import Latency
 from fervor_bench.machine import Places
-from fervor_bench.native import build
 from fervor_bench.pauses import Window
 from fervor_bench.traffic import Traffic
 from fervor_bench.usage import busy_seconds, cpu_seconds, resident_kib
 
-VARIANTS, LEAST_VARIANTS = 32, 8
-"""Different motions and clocks in one run: so many, or fewer where scripts would get long."""
+MOST_LAG_MS = {"spin": 1.0, "sleep": 2.0}
+"""The generator's own delay (99 % of messages) above which an open loop at random phases does not count.
 
-MOST_PAYLOADS = 100_000
-"""In a script, unless that leaves it fewer than `LEAST_VARIANTS`."""
-
-MOST_MESSAGES = 40_000
-"""Of one variant: a closed loop may come to their end, which ends its window."""
-
-FASTEST_US = 3.0
-"""No service here answers frames faster than this, so a closed loop needs no more messages."""
-
-MOST_LAG_MS = 1.0
-"""The generator's own delay (99 % of messages) above which an open loop at random phases does not count."""
+It is part of the latency. Where a few sessions are answered within a millisecond or two, it would be the figure; where
+many have to be answered within 10 ms, it takes a fifth of that at most, and what is kept in spite of it is kept.
+"""
 
 MOST_LOCKSTEP_LAG_MS = 10.0
 """Likewise in lockstep, where all is due at once and sending takes its time."""
@@ -63,6 +55,8 @@ class Trial:
     """When it was measured; None where the contestant's process is elsewhere."""
     unanswered: int
     checkpoints: int
+    lost: bool = False
+    """It ended early, since the contestant fell behind; its latencies are those of the part before."""
     failures: tuple[str, ...] = field(default=())
     """Sessions refused or closed, and errors: what the contestant did not do."""
     objections: tuple[str, ...] = field(default=())
@@ -75,7 +69,7 @@ class Trial:
 
     def keeps(self, most_p99_ms: float) -> bool:
         """Whether every session was served, 99 % of the frames in time."""
-        return not self.failures and self.latency.p99_ms < most_p99_ms
+        return not self.failures and not self.lost and self.latency.p99_ms < most_p99_ms
 
 
 class Used(NamedTuple):
@@ -106,6 +100,16 @@ class Track:
         self.places = places
         self.traffic = traffic
         self._used = used
+        self._kept: Fleet | None = None
+
+    @contextmanager
+    def keeping(self, running: Running, most: int) -> Iterator[None]:
+        """Within, open loops of up to `most` sessions on a contestant go on with the sessions of the one before."""
+        with self._fleet(running, most) as self._kept:
+            try:
+                yield
+            finally:
+                self._kept = None
 
     def run(self, running: Running, load: Load, *, beside: int | None = None) -> Trial:
         """Put a load on a contestant.
@@ -125,9 +129,9 @@ class Track:
                 busy = busy_seconds(self.places.server) - (cpu_seconds(beside) if beside else 0.0)
                 notes.append((time.monotonic(), self._used(running.pid), busy))
 
-        with self._generator(running, load) as generator:
-            generator.wait_until_ready()
-            seen = generator.run(note, note)
+        kept = self._kept if load.loop == "open" else None
+        with nullcontext(kept) if kept else self._fleet(running) as fleet:
+            seen = fleet.run(load, note, note)
         if len(notes) < 2:
             return conclude(load, seen, None)
         (begin, server, busy), (end, server_after, busy_after) = notes
@@ -136,48 +140,15 @@ class Track:
     def idle_kib(self, running: Running, sessions: int) -> float:
         """Resident memory that each of so many idle sessions costs a contestant, KiB."""
         assert running.pid is not None
-        with self._generator(running, Load(min(sessions, 32))) as generator:
-            generator.wait_until_ready()  # what the first sessions make, the others share
+        with self._fleet(running) as fleet:
+            fleet.open(Load(min(sessions, 32)))  # what the first sessions make, the others share
         before = resident_kib(running.pid)
-        with self._generator(running, Load(sessions)) as generator:
-            started = generator.wait_until_ready()
+        with self._fleet(running) as fleet:
+            started = fleet.open(Load(sessions))
             return (resident_kib(running.pid) - before) / started
 
-    def _generator(self, running: Running, load: Load) -> Generator:
-        script = self.folder / "script"
-        messages = messages_needed(load, self.traffic)
-        self.traffic.write(
-            script,
-            address=running.address,
-            target=running.path,
-            variants=min(max(min(VARIANTS, MOST_PAYLOADS // messages), LEAST_VARIANTS), load.sessions),
-            messages=messages,
-            token=running.token,
-        )
-        return Generator(
-            build("load", self.folder),
-            script,
-            address=(running.host, running.port),
-            load=load,
-            settle=messages_to_settle(load, self.traffic),
-            processor=self.places.generator,
-            result=self.folder / "result",
-        )
-
-
-def messages_to_settle(load: Load, traffic: Traffic) -> int:
-    """Messages that one session sends ahead."""
-    return math.ceil(load.settle_s * traffic.rate_hz / traffic.pictures_per_turn) * traffic.messages_per_turn
-
-
-def messages_needed(load: Load, traffic: Traffic) -> int:
-    """Messages that one session may send in a run."""
-    ahead, seconds = messages_to_settle(load, traffic), load.warmup_s + load.seconds
-    if load.loop == "open":
-        turns = math.ceil(seconds * traffic.rate_hz / traffic.pictures_per_turn) + 1
-        return ahead + turns * traffic.messages_per_turn
-    frames = seconds / (FASTEST_US * 1e-6) / load.sessions
-    return ahead + min(math.ceil(frames / traffic.frames_per_message) + 1, MOST_MESSAGES)
+    def _fleet(self, running: Running, most: int = 0) -> Fleet:
+        return Fleet(self.folder, self.places.generator, self.traffic, running, most=most)
 
 
 def conclude(load: Load, seen: Seen, used: Used | None) -> Trial:
@@ -199,6 +170,7 @@ def conclude(load: Load, seen: Seen, used: Used | None) -> Trial:
         window=used.window if used else None,
         unanswered=seen.unanswered,
         checkpoints=seen.checkpoints,
+        lost=seen.lost,
         failures=tuple(_failures(seen)),
         objections=tuple(_objections(load, lag_ms, share, others or 0.0)),
     )
@@ -214,12 +186,12 @@ def _failures(seen: Seen) -> list[str]:
         )
         if count
     ]
-    return told if seen.frames else [*told, "no frame was answered"]
+    return told if seen.frames or seen.lost else [*told, "no frame was answered"]
 
 
 def _objections(load: Load, lag_ms: float, share: float, others: float) -> list[str]:
     told = []
-    most_ms = MOST_LOCKSTEP_LAG_MS if load.arrivals == "lockstep" else MOST_LAG_MS
+    most_ms = MOST_LOCKSTEP_LAG_MS if load.arrivals == "lockstep" else MOST_LAG_MS[load.waits]
     if lag_ms > most_ms:
         told.append(
             f"the generator lagged: 1 % of its messages left {lag_ms:.1f} ms late or more; expected {most_ms:g}"

@@ -17,13 +17,16 @@
 enum { ROOM = 1 << 20 };
 
 enum phase { UNCONNECTED, CONNECTING, UPGRADING, STARTING, LIVE, GONE };
+enum age { YOUNG, SETTLING, SETTLED };
 
 struct session {
   int fd;
   enum phase phase;
+  enum age age;
   uint32_t variant;
   double offset_s;            // of its schedule
   uint64_t next, allowed;     // messages: the next to send, and how many may be sent by now
+  uint64_t base;              // the first message of the schedule of this run
   size_t written;             // bytes of the next message
   uint32_t unanswered;        // frames of the newest message
   double sent_at;             // of the newest message
@@ -36,12 +39,13 @@ static struct script script;
 static int epoll;
 static bool open_loop, json;
 static double start_s, begin_s, end_s, interval_s;
+static double late_s;  // frames in the window that are answered later than this are counted
 static uint32_t group;  // messages of a session that are due together
 static uint64_t settle;  // messages of a session that go ahead of its schedule, each when the one before is answered
 static struct series latencies, lags;
 static struct {
-  uint64_t sent, answered, in_window, counted, checkpoints, errors, blocked;
-  int live, refused, closed, settled;
+  uint64_t sent, answered, in_window, counted, late, checkpoints, errors, blocked;
+  int live, refused, closed, settling;
   bool dry;
   char first_error[256];
 } tally;
@@ -55,10 +59,12 @@ static void note_error(const uint8_t *text, size_t length) {
   }
 }
 
-static bool scheduled(uint64_t message) { return open_loop && message >= settle; }
+static bool scheduled(const struct session *session, uint64_t message) {
+  return open_loop && message >= session->base;
+}
 
 static double due_s(const struct session *session, uint64_t message) {
-  return start_s + session->offset_s + (message - settle) / group * interval_s;
+  return start_s + session->offset_s + (message - session->base) / group * interval_s;
 }
 
 static void watch(struct session *session, uint32_t events, int how) {
@@ -74,6 +80,8 @@ static void lose(struct session *session) {
   } else {
     tally.refused++;
   }
+  tally.settling -= session->age == SETTLING;
+  session->age = SETTLED;
   session->phase = GONE;
   close(session->fd);
 }
@@ -88,7 +96,7 @@ static void flush(struct session *session) {
     }
     const uint64_t *at = script.offsets + session->variant * script.messages + session->next;
     double now = now_s();
-    if (!session->written && !session->blocked && scheduled(session->next)) {
+    if (!session->written && !session->blocked && scheduled(session, session->next)) {
       double due = due_s(session, session->next);
       if (due >= begin_s && due < end_s) add(&lags, now - due);
     }
@@ -136,17 +144,21 @@ static void on_answer(struct session *session, uint64_t seq, double now) {
   }
   tally.answered++;
   tally.in_window += now >= begin_s && now < end_s;
-  bool due = scheduled(message);
+  bool due = scheduled(session, message);
   double from = due ? due_s(session, message) : session->sent_at;
   double at = due ? from : now;
   if (at >= begin_s && at < end_s) {
     add(&latencies, now - from);
     tally.counted++;
+    tally.late += now - from > late_s;
   }
   if (due || message + 1 != session->next || !session->unanswered || --session->unanswered) return;
-  bool settled = session->next == settle;
-  tally.settled += settled;
-  if (!settled && now < end_s) send_next(session);  // settled: it waits for all others
+  if (session->age == SETTLING && session->next == settle) {
+    session->age = SETTLED;  // it waits for all others
+    tally.settling--;
+  } else if (session->age == SETTLING || (!open_loop && now < end_s)) {
+    send_next(session);
+  }
 }
 
 static void on_seqs(struct session *session, const uint8_t *at, const uint8_t *end, double now) {
@@ -244,6 +256,10 @@ static void receive(struct session *session) {
 // --- connecting ------------------------------------------------------------------------------------------------------
 
 static void dial(struct session *session, const struct addrinfo *to) {
+  session->age = settle ? YOUNG : SETTLED;
+  session->next = session->allowed = session->written = session->rest_size = 0;
+  session->base = UINT64_MAX;
+  session->blocked = false;
   session->fd = socket(to->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (session->fd < 0) die("socket");
   int yes = 1;
@@ -251,6 +267,13 @@ static void dial(struct session *session, const struct addrinfo *to) {
   session->phase = CONNECTING;
   watch(session, EPOLLOUT, EPOLL_CTL_ADD);
   if (connect(session->fd, to->ai_addr, to->ai_addrlen) && errno != EINPROGRESS) lose(session);
+}
+
+// Nothing of it counts, neither as lost nor as refused.
+static void hang_up(struct session *session) {
+  tally.live -= session->phase == LIVE;
+  if (session->phase != GONE) close(session->fd);
+  session->phase = UNCONNECTED;
 }
 
 static void on_connected(struct session *session) {
@@ -267,7 +290,7 @@ static void on_connected(struct session *session) {
 }
 
 static void on_event(struct session *session, uint32_t events) {
-  if (session->phase == GONE) return;
+  if (session->phase == GONE || session->phase == UNCONNECTED) return;
   if (session->phase == CONNECTING) {
     on_connected(session);
     return;
