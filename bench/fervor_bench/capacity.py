@@ -10,7 +10,7 @@ NEAR_P99_MS = 20.0
 """A failure below this may be the machine's and is tried again; one above it is a failure."""
 
 STRIDE = 1.25
-"""From the first number tried to the next, up or down; it is squared each time until there is a bracket."""
+"""From the first number tried to the next, up or down; it grows by itself each time until there is a bracket."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +83,9 @@ def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts:
 def _next(low: int, high: int, stride: float, most: int) -> tuple[int, float]:
     """The number to try, and the stride after it."""
     if high > most:
-        return min(max(int(low * stride), low + 1), most), stride * stride
+        return min(max(int(low * stride), low + 1), most), stride * STRIDE
     if low == 0:
-        return max(int(high / stride), 1), stride * stride
+        return max(int(high / stride), 1), stride * STRIDE
     return (low + high) // 2, stride
 
 

@@ -14,6 +14,44 @@ LIBRARIES = ("fervor", "numpy", "onnxruntime", "pydantic", "uvicorn", "uvloop", 
 
 
 @dataclass(frozen=True, slots=True)
+class Gaps:
+    """How one busy processor was kept from a program that never waits; see `gaps`."""
+
+    longest_ms: float
+    share: float
+    """Of the time."""
+    others_share: float
+    """Of the time, in which other programs of this machine ran; what is left is its host's."""
+
+    @property
+    def phrase(self) -> str:
+        """In words."""
+        if not self.share:
+            return "not at all"
+        whose = "by other programs" if self.others_share > self.share / 2 else "by the machine's host"
+        return f"for up to {self.longest_ms:.1f} ms, {self.share:.1%} of the time, mostly {whose}"
+
+
+@dataclass(frozen=True, slots=True)
+class Interruptions:
+    """What the machine does to who is busy on it."""
+
+    processors: int
+    together: Gaps
+    """Of the one that lost most, while all of them were busy."""
+    alone: Gaps
+    """Of one while the others were not."""
+
+    @property
+    def sentence(self) -> str:
+        """What tails of latency owe to the machine."""
+        return (
+            f"With {self.processors} processors busy one of them is taken away {self.together.phrase}; "
+            f"with one busy, {self.alone.phrase} (gaps over 1 ms)"
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Machine:
     """What figures depend on."""
 
@@ -24,6 +62,8 @@ class Machine:
     libraries: dict[str, str]
     load_1min: float
     """Of everything that ran when the run began; above 0.5 or so the machine is not quiet."""
+    interruptions: Interruptions | None = None
+    """None where they were not looked at."""
 
     @property
     def sentence(self) -> str:

@@ -49,6 +49,8 @@ class Plan:
     attempts: int = 2
     confirm_s: float = 10.0
     """Measured time of the trial that has the last word on a capacity."""
+    look_s: float = 2.0
+    """Twice so long it looks at what the machine takes away from who is busy; 0: it does not."""
 
     def __post_init__(self) -> None:
         for name in self.contestants:
@@ -124,5 +126,6 @@ QUICK = Plan(
     resolution=0.25,
     attempts=1,
     confirm_s=0.0,
+    look_s=1.0,
 )
 """A minute or two; its figures are rough."""

@@ -13,6 +13,8 @@ from fervor_bench.sheets import Sheet, remarks, sheets
 def show(console: Console, results: Results) -> None:
     """Print everything."""
     console.print(results.machine.sentence, highlight=False, soft_wrap=True)
+    if results.machine.interruptions:
+        console.print(results.machine.interruptions.sentence, highlight=False, soft_wrap=True)
     console.print(Group(*map(as_table, sheets(results))))
     for sentence in remarks(results):
         console.print(sentence, markup=False, highlight=False, soft_wrap=True)
@@ -35,6 +37,8 @@ def write_markdown(results: Results, path: Path) -> None:
 
 def _lines(results: Results) -> Iterator[str]:
     yield from ("# Results of `fervor bench`", "", f"{results.made}. {results.machine.sentence}.")
+    if results.machine.interruptions:
+        yield from ("", f"{results.machine.interruptions.sentence}.")
     for sheet in sheets(results):
         yield from ("", f"## {sheet.title[0].upper()}{sheet.title[1:]}", "")
         yield _row(sheet.headings)

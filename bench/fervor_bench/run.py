@@ -12,6 +12,7 @@ from fervor.errors import InputError
 from fervor_bench.contestant import CONTESTANTS, Contestant, Running, started
 from fervor_bench.errors import BenchError
 from fervor_bench.frame_cost import Inside, measure_inside
+from fervor_bench.gaps import measure_interruptions
 from fervor_bench.generator import Load
 from fervor_bench.machine import Places, choose_places, describe_machine
 from fervor_bench.plan import SETTLE_S, Plan
@@ -37,6 +38,9 @@ def measure_all(plan: Plan, *, stages: bool, scoring: bool, told: Told) -> Resul
         BenchError: nobody could be measured; says why.
     """
     machine, places = describe_machine(), choose_places()
+    if plan.look_s:
+        told("what the machine takes away")
+        machine = replace(machine, interruptions=measure_interruptions((places.server, places.generator), plan.look_s))
     standings, left_out, breakdowns = [], [], []
     insides: Sequence[Inside] = ()
     rates: Rates | None = None

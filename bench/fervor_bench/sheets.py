@@ -37,6 +37,7 @@ def sheets(results: Results) -> Iterator[Sheet]:
     yield _costs(results)
     if any(standing.capacity for standing in standings):
         yield _capacities(results)
+        yield _searches(standings)
     if any(standing.lone for standing in standings):
         yield _lone(results)
     if any(standing.trials for standing in standings):
@@ -111,6 +112,16 @@ def _capacities(results: Results) -> Sheet:
     return Sheet(
         f"most sessions of which 99 % of the frames are answered within {MOST_P99_MS:g} ms ({how})", headings, rows
     )
+
+
+def _searches(standings: Sequence[Standing]) -> Sheet:
+    rows = [
+        (standing.name, ", ".join(map(_step, standing.search)), f"{sum(trial.took_s for trial in standing.search):.0f}")
+        for standing in standings
+        if standing.search
+    ]
+    title = "how that was found: sessions tried one after the other, and their p99, ms"
+    return Sheet(title, ("contestant", "trials", "took, s"), rows)
 
 
 def _lone(results: Results) -> Sheet:
@@ -233,13 +244,23 @@ def _trial_cells(trial: Trial) -> tuple[str, ...]:
     )
 
 
+def _step(trial: Trial) -> str:
+    """A trial of a search: what was asked, and what came of it."""
+    kept = "kept" if trial.keeps(MOST_P99_MS) else "lost" if trial.lost else "not kept"
+    p99 = "" if trial.lost else f" {_number(trial.latency.p99_ms)}"
+    doubt = "" if trial.valid else ", not valid"
+    return f"{trial.load.sessions} for {trial.load.seconds:g} s:{p99} {kept}{doubt}"
+
+
 def _latency_cells(trial: Trial, digits: int = 2) -> tuple[str, str, str]:
     latency = trial.latency
     return _number(latency.p50_ms, digits), _number(latency.p99_ms, digits), _number(latency.p999_ms, digits)
 
 
 def _verdict(trial: Trial) -> str:
-    return "failed" if trial.failures else "" if trial.valid else "not valid"
+    if trial.failures or trial.lost:
+        return "failed" if trial.failures else "lost"
+    return "" if trial.valid else "not valid"
 
 
 def _cost(standing: Standing | None) -> float | None:

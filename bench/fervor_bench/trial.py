@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -57,6 +57,8 @@ class Trial:
     checkpoints: int
     lost: bool = False
     """It ended early, since the contestant fell behind; its latencies are those of the part before."""
+    took_s: float = 0.0
+    """From beginning to end, with what goes ahead of the window."""
     failures: tuple[str, ...] = field(default=())
     """Sessions refused or closed, and errors: what the contestant did not do."""
     objections: tuple[str, ...] = field(default=())
@@ -123,6 +125,7 @@ class Track:
             BenchError: no session could be started, or the generator failed.
         """
         notes: list[tuple[float, float, float]] = []
+        asked = time.monotonic()
 
         def note() -> None:
             if running.pid is not None:
@@ -132,10 +135,11 @@ class Track:
         kept = self._kept if load.loop == "open" else None
         with nullcontext(kept) if kept else self._fleet(running) as fleet:
             seen = fleet.run(load, note, note)
-        if len(notes) < 2:
-            return conclude(load, seen, None)
-        (begin, server, busy), (end, server_after, busy_after) = notes
-        return conclude(load, seen, Used(server_after - server, busy_after - busy, (begin, end)))
+        used = None
+        if len(notes) == 2:
+            (begin, server, busy), (end, server_after, busy_after) = notes
+            used = Used(server_after - server, busy_after - busy, (begin, end))
+        return replace(conclude(load, seen, used), took_s=time.monotonic() - asked)
 
     def idle_kib(self, running: Running, sessions: int) -> float:
         """Resident memory that each of so many idle sessions costs a contestant, KiB."""
