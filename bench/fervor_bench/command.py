@@ -20,7 +20,7 @@ def bench(
     *,
     contestants: Annotated[str, typer.Option(help="Whom to start and measure, by commas.")] = ",".join(CONTESTANTS),
     encoding: Annotated[Encodings, typer.Option(help="Of the messages, for those that know several.")] = "both",
-    sessions: Annotated[str, typer.Option(help="Numbers of sessions to try, by commas; empty: none.")] = "100,1000",
+    sessions: Annotated[str, typer.Option(help="Numbers of sessions to try, by commas; empty: none.")] = "100",
     seconds: Annotated[float, typer.Option(min=0.2, max=600, help="Measured time of each try.")] = 3.0,
     loop: Annotated[Loop, typer.Option(help="`open`: by schedule; `closed`: next message after the answer.")] = "open",
     arrivals: Annotated[
@@ -40,7 +40,7 @@ def bench(
     checkpoints: Annotated[bool, typer.Option(help="A checkpoint a second and body.")] = True,
     lone: Annotated[
         float, typer.Option(min=0, max=600, help="Measured seconds of a session alone; 0: none is measured.")
-    ] = 10.0,
+    ] = 5.0,
     most_sessions: Annotated[
         int, typer.Option(min=0, max=20_000, help="Where the search for the capacity ends; 0: no search.")
     ] = 8000,

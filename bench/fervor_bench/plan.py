@@ -14,7 +14,8 @@ Encodings = Literal["json", "msgpack", "both"]
 SETTLE_S = 4.2
 """After so long on a sensor's clock a body of the service has both of its states, and costs what it will."""
 
-WARMUP_S = 1.0
+WARMUP_S, TRIAL_WARMUP_S = 1.0, 0.5
+"""Sent before the window; a trial of the search leaves out what sessions that go on do not need."""
 
 SPIN_MOST = 1
 """Up to so many sessions the generator spins."""
@@ -32,12 +33,12 @@ class Plan:
     traffic: Traffic = field(default_factory=Traffic)
     frames: tuple[int, ...] = (1, 6)
     """Frames in a message, tried one by one by who takes several."""
-    sessions: tuple[int, ...] = (100, 1000)
+    sessions: tuple[int, ...] = (100,)
     """Numbers of sessions to try one by one."""
     loop: Loop = "open"
     arrivals: Arrivals = "random"
     seconds: float = 3.0
-    lone_s: float = 10.0
+    lone_s: float = 5.0
     """Measured time of a lone session; 0: none is measured."""
     saturated: int = 64
     """Sessions of the closed loop that fills the contestant's processor."""
@@ -45,6 +46,8 @@ class Plan:
     """Sessions whose memory is taken; 0: none."""
     most_sessions: int = 8000
     """Where the search for the capacity ends; 0: no search."""
+    search_s: float = 2.0
+    """Measured time of a trial of the search."""
     resolution: float = 0.05
     attempts: int = 2
     confirm_s: float = 10.0
@@ -79,9 +82,10 @@ class Plan:
 
     def trial(self, sessions: int, *, seconds: float | None = None, settled: bool) -> Load:
         """An open loop of which only one thing is asked: whether it is kept, or nearly."""
-        load = replace(self.load(sessions, seconds=seconds, settled=settled), loop="open")
+        load = self.load(sessions, seconds=self.search_s if seconds is None else seconds, settled=settled)
         waits: Waits = "spin" if sessions <= SPIN_MOST else "sleep"
-        return replace(load, waits=waits, late_s=NEAR_P99_MS / 1000.0)
+        warmup_s = min(TRIAL_WARMUP_S, load.warmup_s)
+        return replace(load, loop="open", waits=waits, warmup_s=warmup_s, late_s=NEAR_P99_MS / 1000.0)
 
     def entries(self) -> list[tuple[Contestant, Traffic]]:
         """Who runs with which traffic; a simple contestant gets what it understands.
@@ -123,6 +127,7 @@ QUICK = Plan(
     lone_s=2.0,
     idle=100,
     most_sessions=4000,
+    search_s=0.8,
     resolution=0.25,
     attempts=1,
     confirm_s=0.0,

@@ -14,7 +14,7 @@ from fervor_bench.plan import Plan
 from fervor_bench.traffic import Encoding, Traffic
 from fervor_bench.trial import Track, Trial
 
-FILL_SHARE = 0.9
+FILL_SHARE = 0.75
 """The search for the capacity begins at this share of what the saturated rate would carry."""
 
 Told = Callable[[str], None]
@@ -121,7 +121,7 @@ def _search(
     """The capacity, and the trials that found it."""
     trials: list[Trial] = []
 
-    def judge(sessions: int, seconds: float = plan.seconds) -> Verdict:
+    def judge(sessions: int, seconds: float = plan.search_s) -> Verdict:
         told(f"{name}: does it keep {sessions} sessions?")
         trial = track.run(running, plan.trial(sessions, seconds=seconds, settled=running.states == 1))
         trials.append(trial)
