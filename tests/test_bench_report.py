@@ -1,11 +1,12 @@
 """Sheets become tables of a terminal, and a page."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
-from fervor_bench.machine import describe_machine
+from fervor_bench.machine import Gaps, Interruptions, describe_machine
 from fervor_bench.plan import Plan
 from fervor_bench.report import as_table, write_markdown
 from fervor_bench.results import Breakdown, Results
@@ -22,8 +23,9 @@ def test_a_table_has_all_cells() -> None:
 
 def test_a_page_has_a_table_a_sheet_and_says_what_was_left_out(tmp_path: Path) -> None:
     path = tmp_path / "results.md"
+    gaps = Interruptions(2, Gaps(9.9, 0.01, 0.01), Gaps(0.0, 0.0, 0.0))
     results = Results(
-        machine=describe_machine(),
+        machine=replace(describe_machine(), interruptions=gaps),
         plan=Plan(),
         standings=[],
         left_out=["floor: no C compiler"],
@@ -41,3 +43,4 @@ def test_a_page_has_a_table_a_sheet_and_says_what_was_left_out(tmp_path: Path) -
     ]
     assert lines[-1] == "- floor: no C compiler"
     assert results.machine.sentence in lines[2]
+    assert lines[4] == f"{gaps.sentence}."

@@ -28,8 +28,10 @@ TINY = Plan(
     saturated=2,
     idle=4,
     most_sessions=2,
+    search_s=0.4,
     attempts=1,
     confirm_s=0.5,
+    look_s=0.2,
 )
 
 
@@ -57,6 +59,9 @@ def test_service_and_floor_are_measured_side_by_side(workshop: Path, tmp_path: P
         assert standing.lone.awake is not None
         assert standing.capacity is not None
         assert (standing.confirmed is None) == (standing.capacity.sessions == 0)
+        assert standing.confirmed is None or standing.confirmed in standing.search
+        assert [trial.load.sessions for trial in standing.search][0] in (1, 2)
+        assert all(trial.took_s > trial.load.seconds for trial in standing.search if not trial.lost)
         assert all(not trial.failures for trial in standing.trials)
     service, floor = results.standings
     assert service.pauses is not None
@@ -68,12 +73,16 @@ def test_service_and_floor_are_measured_side_by_side(workshop: Path, tmp_path: P
         "x naive",
         "of floor",
         "most sessions",
+        "how that was found",
+        "With 2 processors busy",
         "a lone session",
         "pauses",
     ):
         assert word in text
     results.write(tmp_path / "results.json")
     written = json.loads((tmp_path / "results.json").read_text())
+    assert written["machine"]["interruptions"]["processors"] == 2
+    assert [trial["load"]["sessions"] for trial in written["standings"][0]["search"]]
     assert written["plan"]["sessions"] == [2, 3]
     assert written["standings"][1]["contestant"] == "floor"
     plot(results, tmp_path / "plot.png")
@@ -126,6 +135,7 @@ def test_who_can_not_run_here_costs_no_other_its_place(workshop: Path, monkeypat
         lone_s=0,
         idle=0,
         most_sessions=0,
+        look_s=0,
     )
     results = measure_all(plan, stages=False, scoring=False, told=quiet)
     assert [standing.contestant for standing in results.standings] == ["fervor"]
@@ -172,6 +182,16 @@ def test_whoever_keeps_two_states_is_measured_with_both() -> None:
     assert plan.load(5, settled=False).settle_s > 4.0  # the second state begins
     assert plan.filled(5, settled=False).settle_s > 4.0
     assert plan.load(5, settled=True).settle_s == 0.0
+
+
+def test_the_generator_polls_for_a_lone_session_and_in_closed_loops() -> None:
+    plan = Plan()
+    assert plan.load(1, settled=True).waits == plan.trial(1, settled=True).waits == "spin"
+    assert plan.load(2, settled=True).waits == plan.trial(500, settled=True).waits == "sleep"
+    for load in (plan.filled(64, settled=True), replace(plan, loop="closed").load(64, settled=True)):
+        assert (load.loop, load.waits) == ("closed", "spin")
+    trial = replace(plan, loop="closed").trial(500, settled=True)
+    assert (trial.loop, trial.waits) == ("open", "sleep")
 
 
 @pytest.mark.parametrize("url", ["wss://robot.local", "robot.local:80", "ws://", "ws://robot.local:port"])

@@ -48,7 +48,11 @@ def standing(name: str, us: float, sessions: int, *, frames: int = 1, p50: float
         saturated=trial(us=us),
         capacity=Capacity(sessions, bounded=True),
         confirmed=trial(sessions),
-        search=(trial(sessions),),
+        search=(
+            trial(sessions, p50=4.0, took_s=2.6),
+            trial(2 * sessions, lost=True, took_s=1.5),
+            trial(sessions + 50, p50=7.0, objections=("the generator lagged",), took_s=2.6),
+        ),
         trials=(trial(100),),
         pauses=Pauses(10, 2, 1.5, 0.001) if name == "fervor" else None,
     )
@@ -107,9 +111,18 @@ def test_costs_stand_beside_the_naive_service_and_both_floors(row: str, naive: s
 def test_capacities_have_their_latencies() -> None:
     found = sheet("most sessions")
     assert cell(found, "fervor, msgpack", "sessions") == "500"
+    assert cell(found, "fervor, msgpack", "x naive") == "5.0"
     assert cell(found, "fervor, msgpack", "of floor") == "25%"
     assert cell(found, "fervor, msgpack", "of floor-two") == "50%"
     assert cell(found, "fervor, msgpack", "p99.9") == "3.00"
+
+
+def test_a_capacity_says_how_it_was_found() -> None:
+    found = sheet("how that was found")
+    assert cell(found, "fervor, msgpack", "trials") == (
+        "500 for 5 s: 8.0 kept, 1000 for 5 s: lost, 550 for 5 s: 14.0 not kept, not valid"
+    )
+    assert cell(found, "fervor, msgpack", "took, s") == "7"
 
 
 def test_a_lone_session_is_a_multiple_of_the_floors() -> None:
@@ -147,3 +160,5 @@ def test_what_does_not_count_is_told() -> None:
     assert cell(sheet("a lone session", results), "fervor, msgpack", "") == "not valid"
     assert cell(sheet("most sessions", results), "fervor, msgpack", "sessions") == "≥ 500"
     assert cell(sheet("latency", results), "fervor, msgpack", "") == "failed"
+    behind = replace(results, standings=[replace(lacking, trials=(trial(9, lost=True),))])
+    assert cell(sheet("latency", behind), "fervor, msgpack", "") == "lost"

@@ -67,6 +67,14 @@ def test_lockstep_and_closed_loops_are_judged_by_their_own_measure() -> None:
     assert conclude(Load(10, loop="closed"), seen(busy_s=1.99, lags=np.zeros(0, np.float32)), None).valid
 
 
+def test_who_fell_behind_keeps_nothing() -> None:
+    trial = conclude(Load(10), seen(lost=True), None)
+    assert trial.lost
+    assert not trial.keeps(1e9)
+    # Before its window began: nothing was answered in it, and that is no failure of its own.
+    assert conclude(Load(10), seen(lost=True, frames=0, window_s=0.0), None).failures == ()
+
+
 @pytest.mark.parametrize("changes", [{"refused": 1}, {"closed": 1}, {"errors": 1}, {"frames": 0}])
 def test_sessions_that_were_not_served_are_failures(changes) -> None:
     assert not conclude(Load(10), seen(**changes), None).keeps(1e9)

@@ -51,6 +51,7 @@ class Fleet:
         self._most = most
         self._generator: Generator | None = None
         self._made_for = Load(0)
+        self._room = 0  # sessions that the generator can have
         self._left = 0  # messages of the script that a session has left
 
     def __enter__(self) -> Self:
@@ -67,12 +68,10 @@ class Fleet:
         Raises:
             BenchError: none could be started.
         """
-        fits = (load.loop, load.arrivals, load.settle_s) == (
-            self._made_for.loop,
-            self._made_for.arrivals,
-            self._made_for.settle_s,
-        )
-        if self._generator is None or not fits or self._left < _messages_in_time(load, self._traffic):
+        made_for = self._made_for
+        same = (load.loop, load.arrivals, load.settle_s) == (made_for.loop, made_for.arrivals, made_for.settle_s)
+        enough = self._left >= _messages_in_time(load, self._traffic) and self._room >= load.sessions
+        if self._generator is None or not (same and enough):
             self._end()
             self._begin(load)
         assert self._generator is not None
@@ -93,7 +92,7 @@ class Fleet:
         return seen
 
     def _begin(self, load: Load) -> None:
-        sessions, self._left = max(load.sessions, self._most), _messages_in_time(load, self._traffic)
+        self._room, self._left = max(load.sessions, self._most), _messages_in_time(load, self._traffic)
         if self._most:
             self._left = max(self._left, math.ceil(KEPT_S * _messages_a_second(self._traffic)))
         settle, script = messages_to_settle(load, self._traffic), self._folder / "script"
@@ -102,7 +101,7 @@ class Fleet:
             script,
             address=self._running.address,
             target=self._running.path,
-            variants=min(max(min(VARIANTS, MOST_PAYLOADS // (settle + self._left)), LEAST_VARIANTS), sessions),
+            variants=min(max(min(VARIANTS, MOST_PAYLOADS // (settle + self._left)), LEAST_VARIANTS), self._room),
             messages=settle + self._left,
             token=self._running.token,
         )
@@ -111,7 +110,7 @@ class Fleet:
             build("load", self._folder),
             script,
             address=(self._running.host, self._running.port),
-            most=sessions,
+            most=self._room,
             arrivals=load.arrivals,
             settle=settle,
             processor=self._processor,

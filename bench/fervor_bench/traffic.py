@@ -15,6 +15,7 @@ import secrets
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -216,8 +217,13 @@ def framed(payload: bytes, *, text: bool) -> bytes:
         head += struct.pack(">BH", 0x80 | 126, size)
     else:
         head += struct.pack(">BQ", 0x80 | 127, size)
-    key = np.resize(np.frombuffer(MASK_KEY, np.uint8), size)
-    return head + MASK_KEY + (np.frombuffer(payload, np.uint8) ^ key).tobytes()
+    return head + MASK_KEY + (np.frombuffer(payload, np.uint8) ^ _mask(size)).tobytes()
+
+
+@lru_cache(maxsize=256)
+def _mask(size: int) -> npt.NDArray[np.uint8]:
+    """The key, repeated; messages of a run have few sizes, and most of the time to frame one would go here."""
+    return np.resize(np.frombuffer(MASK_KEY, np.uint8), size)
 
 
 def _shorter(pose: npt.NDArray[np.float32]) -> list[list[float]]:

@@ -107,7 +107,8 @@ class Track:
     @contextmanager
     def keeping(self, running: Running, most: int) -> Iterator[None]:
         """Within, open loops of up to `most` sessions on a contestant go on with the sessions of the one before."""
-        with self._fleet(running, most) as self._kept:
+        with self._fleet(running, most) as fleet:
+            self._kept = fleet
             try:
                 yield
             finally:
