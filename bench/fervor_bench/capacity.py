@@ -1,16 +1,16 @@
 """The largest number of sessions that a contestant serves in time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 MOST_P99_MS = 10.0
 """99 % of the frames must be answered within this: a third of a frame's interval at 30 Hz."""
 
-NEAR_P99_MS = 20.0
+NEAR_P99_MS = 15.0
 """A failure below this may be the machine's and is tried again; one above it is a failure."""
 
 STRIDE = 1.25
-"""From the first number tried to the next, up or down; it grows by itself each time until there is a bracket."""
+"""From one number to the next, up or down, until one is kept and one is not; each stride is longer by as much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +56,22 @@ def find_capacity(
         most: no more than so many.
         resolution: of the answer, as a share of it.
         attempts: a number that fails is tried so often while its failures are near, or prove nothing.
-        confirm: in a long trial; where it says no, it is asked for a number smaller by `resolution`, until it agrees.
+        confirm: in a long trial; the answer is the largest number that it agrees to, found from the short trials' on.
     """
-    found = _search(judge, first=first, most=most, resolution=resolution, attempts=attempts)
-    while confirm is not None and found.sessions:
-        kept, sound = _try(confirm, found.sessions, attempts, near_too=False)
-        if kept:
-            break
-        found = Capacity(min(int(found.sessions * (1.0 - resolution)), found.sessions - 1), bounded=sound)
-    return found
+    found = _search(judge, first=first, most=most, resolution=resolution, attempts=attempts, stride=STRIDE)
+    if confirm is None or not found.sessions:
+        return found
+
+    def long(sessions: int) -> Verdict:
+        return replace(confirm(sessions), near=False)  # such a trial takes its time, and the next number is not far
+
+    most = found.sessions
+    agreed = _search(long, first=most, most=most, resolution=resolution, attempts=attempts, stride=1.0 + resolution)
+    return agreed if agreed.sessions < found.sessions else found
 
 
-def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts: int) -> Capacity:
-    low, high, valid, number, stride = 0, most + 1, False, min(max(first, 1), most), STRIDE
+def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts: int, stride: float) -> Capacity:
+    low, high, valid, number, growth = 0, most + 1, False, min(max(first, 1), most), stride
     while True:
         kept, sound = _try(judge, number, attempts)
         if kept:
@@ -77,19 +80,16 @@ def _search(judge: Judge, *, first: int, most: int, resolution: float, attempts:
             high, valid = number, sound
         if high - low <= max(1, int(resolution * low)):
             return Capacity(low, bounded=valid and high <= most)
-        number, stride = _next(low, high, stride, most)
+        if high > most:
+            number = min(max(int(low * stride), low + 1), most)
+        elif low == 0:
+            number = max(min(int(high / stride), high - 1), 1)
+        else:
+            number = (low + high) // 2
+        stride *= growth
 
 
-def _next(low: int, high: int, stride: float, most: int) -> tuple[int, float]:
-    """The number to try, and the stride after it."""
-    if high > most:
-        return min(max(int(low * stride), low + 1), most), stride * STRIDE
-    if low == 0:
-        return max(int(high / stride), 1), stride * STRIDE
-    return (low + high) // 2, stride
-
-
-def _try(judge: Judge, number: int, attempts: int, *, near_too: bool = True) -> tuple[bool, bool]:
+def _try(judge: Judge, number: int, attempts: int) -> tuple[bool, bool]:
     """Whether a number is kept, and whether any failure was sound."""
     sound = False
     for _ in range(attempts):
@@ -97,6 +97,6 @@ def _try(judge: Judge, number: int, attempts: int, *, near_too: bool = True) -> 
         if verdict.keeps:
             return True, True
         sound = sound or verdict.valid
-        if verdict.valid and not (verdict.near and near_too):
+        if verdict.valid and not verdict.near:
             break
     return False, sound

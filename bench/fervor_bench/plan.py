@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from fervor_bench.capacity import NEAR_P99_MS
+from fervor_bench.capacity import MOST_P99_MS, NEAR_P99_MS
 from fervor_bench.contestant import CONTESTANTS, Contestant
 from fervor_bench.errors import BenchError
 from fervor_bench.generator import Arrivals, Load, Loop, Waits
@@ -80,12 +80,21 @@ class Plan:
         load = replace(self.load(sessions, settled=settled), loop="closed", waits="spin")
         return replace(load, warmup_s=min(0.5, self.seconds / 2))
 
-    def trial(self, sessions: int, *, seconds: float | None = None, settled: bool) -> Load:
+    def trial(self, sessions: int, *, settled: bool) -> Load:
         """An open loop of which only one thing is asked: whether it is kept, or nearly."""
-        load = self.load(sessions, seconds=self.search_s if seconds is None else seconds, settled=settled)
+        load = self.load(sessions, seconds=self.search_s, settled=settled)
         waits: Waits = "spin" if sessions <= SPIN_MOST else "sleep"
         warmup_s = min(TRIAL_WARMUP_S, load.warmup_s)
         return replace(load, loop="open", waits=waits, warmup_s=warmup_s, late_s=NEAR_P99_MS / 1000.0)
+
+    def long_trial(self, sessions: int, *, settled: bool) -> Load:
+        """The open loop that has the last word: whether it is kept."""
+        return replace(
+            self.trial(sessions, settled=settled),
+            warmup_s=min(WARMUP_S, self.confirm_s / 2),
+            seconds=self.confirm_s,
+            late_s=MOST_P99_MS / 1000.0,
+        )
 
     def entries(self) -> list[tuple[Contestant, Traffic]]:
         """Who runs with which traffic; a simple contestant gets what it understands.

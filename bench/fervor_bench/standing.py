@@ -7,6 +7,7 @@ from pathlib import Path
 from fervor_bench.capacity import MOST_P99_MS, NEAR_P99_MS, Capacity, Verdict, find_capacity
 from fervor_bench.check import check_estimates
 from fervor_bench.contestant import PAUSES, Contestant, Running, started
+from fervor_bench.generator import Load
 from fervor_bench.lone import Lone, measure_lone
 from fervor_bench.machine import Places
 from fervor_bench.pauses import Pauses, read_pauses
@@ -14,7 +15,7 @@ from fervor_bench.plan import Plan
 from fervor_bench.traffic import Encoding, Traffic
 from fervor_bench.trial import Track, Trial
 
-FILL_SHARE = 0.75
+FILL_SHARE = 0.6
 """The search for the capacity begins at this share of what the saturated rate would carry."""
 
 Told = Callable[[str], None]
@@ -121,23 +122,21 @@ def _search(
     """The capacity, and the trials that found it."""
     trials: list[Trial] = []
 
-    def judge(sessions: int, seconds: float = plan.search_s) -> Verdict:
-        told(f"{name}: does it keep {sessions} sessions?")
-        trial = track.run(running, plan.trial(sessions, seconds=seconds, settled=running.states == 1))
+    def ask(load: Load) -> Verdict:
+        told(f"{name}: does it keep {load.sessions} sessions?")
+        trial = track.run(running, load)
         trials.append(trial)
         return Verdict(keeps=trial.keeps(MOST_P99_MS), valid=trial.valid, near=trial.keeps(NEAR_P99_MS))
 
-    def confirm(sessions: int) -> Verdict:
-        return judge(sessions, plan.confirm_s)
-
+    settled = running.states == 1
     per_session = track.traffic.rate_hz * track.traffic.bodies
     found = find_capacity(
-        judge,
+        lambda sessions: ask(plan.trial(sessions, settled=settled)),
         first=int(FILL_SHARE * saturated.frames_per_second / per_session),
         most=plan.most_sessions,
         resolution=plan.resolution,
         attempts=plan.attempts,
-        confirm=confirm if plan.confirm_s else None,
+        confirm=(lambda sessions: ask(plan.long_trial(sessions, settled=settled))) if plan.confirm_s else None,
     )
     return found, trials
 
