@@ -22,8 +22,10 @@ def plot(results: Results, path: Path) -> None:
 
 def _latencies(axes: Axes, results: Results) -> None:
     for standing in results.standings:
-        seen = [trial for trial in (*standing.trials, *standing.search) if math.isfinite(trial.latency.p99_ms)]
-        points = sorted((trial.load.sessions, trial.latency.p99_ms) for trial in seen)
+        seen = [trial for trial in (*standing.trials, *standing.search) if not trial.lost]
+        points = sorted(
+            (trial.load.sessions, trial.latency.p99_ms) for trial in seen if math.isfinite(trial.latency.p99_ms)
+        )
         if points:
             axes.plot([at for at, _ in points], [p99 for _, p99 in points], marker="o", label=standing.name)
     axes.axhline(MOST_P99_MS, color="grey", linestyle="--", linewidth=1)

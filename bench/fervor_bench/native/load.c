@@ -12,7 +12,7 @@
 //     all of them send: "begin" and "end" around the measured window, then one JSON object. RESULT gets the latencies
 //     and the lags, float32 microseconds.
 //
-// First every new session sends SETTLE messages, each when the one before is answered: it is measured as it is later on.
+// First every new session sends SETTLE messages, each when the one before is answered: what is measured is its later life.
 // Open loop: latency counts from the moment when a message was due, whenever it could be sent (no coordinated
 // omission); `lag` is how late the generator itself was. Closed loop: latency counts from the send.
 //
@@ -20,8 +20,8 @@
 // many were answered after LATE_S that 1 % of the whole window's will have been.
 //
 // `spin`: between messages it polls, since a processor that sleeps wakes up late; its busy time then is that of the
-// rounds in which something was sent or came. `sleep`: it leaves its processor alone, and the host of a virtual machine
-// has less reason to take one away; its busy time is processor time.
+// rounds in which something was sent or came. `sleep`: it leaves its processor to others meanwhile, who would else take
+// the service's; its busy time is processor time.
 #define _GNU_SOURCE
 #include <sched.h>
 #include <sys/resource.h>
@@ -29,7 +29,8 @@
 
 #include "session.h"
 
-enum { CONNECTS_AT_ONCE = 32, SETTLE_AT_ONCE = 64, BURST = 64, EVENTS = 16 };  // EVENTS: few, so that what is due leaves before all answers are read
+enum { CONNECTS_AT_ONCE = 32, SETTLE_AT_ONCE = 64, BURST = 64 };
+enum { EVENTS = 16 };  // at once: few, so that what is due leaves before all answers are read
 static const double GRACE_S = 2.0, START_S = 60.0, LATE_SHARE = 0.011;  // above 1 %, since windows cut turns
 
 static struct session *sessions, **order;  // order: by when they are due in a turn
@@ -181,7 +182,7 @@ static double run(const struct plan *plan, bool *lost) {
   bool begun = false;
   double used = 0, busy = 0, now = now_s();
   for (int i = 0; !open_loop && i < session_count; i++) send_next(sessions + i);
-  while (now < end_s && tally.live && !(tally.dry && !open_loop) && !*lost) {
+  while (now < end_s && tally.live && !(tally.dry && !open_loop) && !*lost && !told) {  // told: nobody listens any more
     if (!begun && now >= begin_s) {
       begun = true;
       used = cpu_s(), busy = 0;
@@ -263,8 +264,9 @@ static void obey(const char *result, int most, const struct addrinfo *to) {
   char line[256];
   int count;
   for (;;) {
-    for (told = false; !told;) turn(now_s() + 1.0);
+    while (!told) turn(now_s() + 1.0);
     if (!fgets(line, sizeof line, stdin)) return;  // whoever started this is done, or gone
+    told = false;
     if (sscanf(line, "open %d", &count) == 1)
       open_all(count < most ? count : most, to);
     else
