@@ -12,7 +12,7 @@
 //     all of them send: "begin" and "end" around the measured window, then one JSON object. RESULT gets the latencies
 //     and the lags, float32 microseconds.
 //
-// First every new session sends SETTLE messages, each when the one before is answered: what is measured is its later life.
+// First every new session sends SETTLE messages, each when the one before is answered: it is as old as robots are.
 // Open loop: latency counts from the moment when a message was due, whenever it could be sent (no coordinated
 // omission); `lag` is how late the generator itself was. Closed loop: latency counts from the send.
 //
