@@ -91,7 +91,7 @@ def test_who_keeps_all_or_nothing_is_known_soon(verdict: Verdict, answer: int) -
 def test_the_long_trial_has_the_last_word() -> None:
     confirm = Asked(lambda sessions: KEPT if sessions <= 80 else NEAR)
     found = find_capacity(lambda n: KEPT if n <= 100 else FAR, first=64, most=1000, confirm=confirm)
-    assert 76 <= found.sessions <= 80
+    assert 72 <= found.sessions <= 80
     assert found.bounded
     assert len(confirm.numbers) == len(set(confirm.numbers)) <= 7  # one long trial a number, however near
     assert found.sessions in confirm.numbers
@@ -103,7 +103,7 @@ def test_long_trials_find_their_own_number(true: int, share: float) -> None:
     longer = int(true * share)
     confirm = Asked(lambda sessions: KEPT if sessions <= longer else FAR)
     found = find_capacity(lambda n: KEPT if n <= true else FAR, first=true, most=4000, confirm=confirm)
-    assert found.sessions <= min(longer, true) <= found.sessions * 1.05**2 + 1
+    assert found.sessions <= min(longer, true) <= found.sessions * 1.1 + 1
     assert len(confirm.numbers) <= 13
 
 

@@ -56,7 +56,7 @@ def find_capacity(
         most: no more than so many.
         resolution: of the answer, as a share of it.
         attempts: a number that fails is tried so often while its failures are near, or prove nothing.
-        confirm: in a long trial; the answer is the largest number that it agrees to, found from the short trials' on.
+        confirm: in a long trial; where it says no, the answer is searched for from there down, to twice `resolution`.
     """
     found = _search(judge, first=first, most=most, resolution=resolution, attempts=attempts, stride=STRIDE)
     if confirm is None or not found.sessions:
@@ -65,8 +65,8 @@ def find_capacity(
     def long(sessions: int) -> Verdict:
         return replace(confirm(sessions), near=False)  # such a trial takes its time, and the next number is not far
 
-    most = found.sessions
-    agreed = _search(long, first=most, most=most, resolution=resolution, attempts=attempts, stride=1.0 + resolution)
+    most, stride = found.sessions, 1.0 + resolution
+    agreed = _search(long, first=most, most=most, resolution=2 * resolution, attempts=attempts, stride=stride)
     return agreed if agreed.sessions < found.sessions else found
 
 
