@@ -20,12 +20,13 @@
 // many were answered after LATE_S that 1 % of the whole window's will have been.
 //
 // `spin`: between messages it polls, since a processor that sleeps wakes up late; its busy time then is that of the
-// rounds in which something was sent or came. `sleep`: it leaves its processor to others meanwhile, who would else take
-// the service's; its busy time is processor time.
+// rounds in which something was sent or came. `sleep`: it naps, and leaves its processor to others meanwhile, who would
+// else take the service's; its busy time is processor time. It does not sleep until an answer comes: then every answer
+// would have to wake it, which takes the service as long as the answer itself, and which no robot at the other end of a
+// network asks of it.
 #define _GNU_SOURCE
 #include <sched.h>
 #include <sys/resource.h>
-#include <sys/timerfd.h>
 
 #include "session.h"
 
@@ -34,29 +35,33 @@ enum { EVENTS = 16 };  // at once: few, so that what is due leaves before all an
 static const double GRACE_S = 2.0, START_S = 60.0, LATE_SHARE = 0.011;  // above 1 %, since windows cut turns
 
 static struct session *sessions, **order;  // order: by when they are due in a turn
-static int session_count, timer;
-static bool spin, told;  // told: standard input said something
+static int session_count;
+static bool told;  // standard input said something
+static enum { BLOCK, NAP, SPIN } waits;  // see `turn`
+static const double NAP_S = 0.0002;
 
-// Handles what happens until `until`, or what is there already for 0 and while spinning. Returns whether something did.
+// Sleeps until `until`, but for a nap at most.
+static void nap(double until) {
+  double wake = now_s() + NAP_S;
+  if (until < wake) wake = until;
+  struct timespec at = {.tv_sec = wake, .tv_nsec = (wake - (time_t)wake) * 1e9};
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, NULL);
+}
+
+// Handles what has happened. Before that it waits: until something does, or until `until` (BLOCK); for a nap that ends
+// by then (NAP); not at all (SPIN, or 0). Returns whether anything happened.
 static bool turn(double until) {
-  static double armed;
-  if (spin) until = 0;
-  if (until > 0 && until != armed) {
-    struct itimerspec at = {.it_value = {.tv_sec = until, .tv_nsec = (until - (time_t)until) * 1e9}};
-    if (timerfd_settime(timer, TFD_TIMER_ABSTIME, &at, NULL)) die("timerfd");
-    armed = until;
-  }
+  static bool more;
+  double left = until - now_s();
+  if (waits == NAP && left > 0 && !more) nap(until);
   struct epoll_event events[EVENTS];
-  int count = epoll_wait(epoll, events, EVENTS, until > 0 ? -1 : 0);
+  int count = epoll_wait(epoll, events, EVENTS, waits == BLOCK && left > 0 ? (int)(left * 1e3) + 1 : 0);
+  more = count == EVENTS;
   for (int i = 0; i < count; i++) {
-    uint64_t ticks;
-    if (events[i].data.ptr == &timer) {
-      if (read(timer, &ticks, sizeof ticks) > 0) armed = 0;
-    } else if (events[i].data.ptr == NULL) {
+    if (events[i].data.ptr == NULL)
       told = true;
-    } else {
+    else
       on_event(events[i].data.ptr, events[i].events);
-    }
   }
   return count > 0;
 }
@@ -173,7 +178,7 @@ static void go_first(bool first) {
 // Returns the seconds of the window in which it was busy.
 static double run(const struct plan *plan, bool *lost) {
   prepare();
-  go_first(!spin);
+  go_first(waits == NAP);
   start_s = now_s() + 0.05;
   begin_s = start_s + plan->warmup_s;
   end_s = begin_s + plan->seconds;
@@ -196,8 +201,8 @@ static double run(const struct plan *plan, bool *lost) {
     if (moved || tally.sent > sent) busy += now - before;
     *lost = is_lost(plan);
   }
-  if (!spin) busy = cpu_s() - used;
-  spin = false;
+  if (waits == NAP) busy = cpu_s() - used;
+  waits = BLOCK;
   go_first(false);
   say("end");
   if (now < end_s) end_s = now;  // it is lost, or the script or the sessions came to an end
@@ -245,16 +250,16 @@ static void tell(double busy, bool lost) {
 // --- what it is told to do -------------------------------------------------------------------------------------------
 
 static void obey_run(const char *line, const char *result) {
-  char loop[8], waits[8];
+  char loop[8], how[8];
   struct plan plan;
-  if (sscanf(line, "run %7s %7s %lf %lf %lf %lf", loop, waits, &plan.warmup_s, &plan.seconds, &plan.backlog_s,
+  if (sscanf(line, "run %7s %7s %lf %lf %lf %lf", loop, how, &plan.warmup_s, &plan.seconds, &plan.backlog_s,
              &late_s) != 6)
     die(line);
   bool lost = false;
   open_loop = !strcmp(loop, "open");
-  spin = !strcmp(waits, "spin");
   begin_s = end_s = 1e18;
   settle_all();
+  waits = strcmp(how, "spin") ? NAP : SPIN;
   double busy = run(&plan, &lost);
   write_result(result);
   tell(busy, lost);
@@ -298,9 +303,8 @@ int main(int count, char **words) {
   if (getaddrinfo(words[1], words[2], &hints, &to)) die(words[1]);
   allow_files(most + 64);
   epoll = epoll_create1(EPOLL_CLOEXEC);
-  timer = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
-  struct epoll_event tell = {.events = EPOLLIN, .data.ptr = &timer}, hear = {.events = EPOLLIN};
-  if (epoll_ctl(epoll, EPOLL_CTL_ADD, timer, &tell) || epoll_ctl(epoll, EPOLL_CTL_ADD, STDIN_FILENO, &hear))
+  struct epoll_event hear = {.events = EPOLLIN};
+  if (epoll_ctl(epoll, EPOLL_CTL_ADD, STDIN_FILENO, &hear))
     die("epoll");
   spread(most, !strcmp(words[6], "lockstep"));
   obey(words[4], most, to);
