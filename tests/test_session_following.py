@@ -142,3 +142,15 @@ def test_nearly_all_frames_are_prompt():
         service.hear(message)
     assert service.prompted == 39 + 60
     assert service.session.totals.frames == 100 + MOST_PROMPT + 1
+
+
+def test_the_checkpoint_of_a_message_goes_with_the_last_frame_of_its_body():
+    """So that the frames before need no copy of what the engine holds, and may run together."""
+    for promptly in (True, False):
+        service = Service({"checkpoint_s": 0.1, "emotion": "joy"}, promptly=promptly)
+        own = {"step": 1, "seconds": 1 / 60, "q": POSES[0].tobytes(), "emotion": None}
+        message = [{**own, "body": name} for name in ["ann", "bob", "ann", "bob", "ann"]]
+        for each in told([message, message]):
+            service.hear(each)
+        kept = [(each.body, each.seq) for each in service.said if each.type == "checkpoint"]
+        assert kept == [("bob", 4), ("ann", 5), ("bob", 9), ("ann", 10)]

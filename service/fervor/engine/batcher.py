@@ -8,7 +8,7 @@ measured to be 8-20 % faster than a thread.
 import asyncio
 import logging
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -71,25 +71,42 @@ class Batcher:
             for first in range(0, len(prompt), MOST_TICKETS):
                 outcomes += self._run(prompt[first : first + MOST_TICKETS])
         else:
-            outcomes = self._run_in_waves(prompt)
+            outcomes = self._run_by_body(prompt)
         if self._waiting and not prompt:
             self._run()
         return outcomes
 
-    def _run_in_waves(self, prompt: Sequence[Ticket]) -> list[Outcome | EngineError]:
-        """As `run`, of tickets of which some share a slot: one of each slot at a time."""
-        waves: list[list[int]] = []  # places in `prompt`
-        taken: Counter[int] = Counter()
+    def _run_by_body(self, prompt: Sequence[Ticket]) -> list[Outcome | EngineError]:
+        """As `run`, of tickets of which some share a slot: whole bodies together, or one ticket of each at a time."""
+        bodies: dict[int, list[int]] = {}  # slot → places in `prompt`
         for place, ticket in enumerate(prompt):
-            number = taken[ticket.slot]
-            taken[ticket.slot] += 1
-            if number == len(waves):
-                waves.append([])
-            waves[number].append(place)
+            bodies.setdefault(ticket.slot, []).append(place)
         outcomes: dict[int, Outcome | EngineError] = {}
-        for wave in waves:
+        whole = [places for places in bodies.values() if self.engine.is_sequence([prompt[place] for place in places])]
+        most = max(MOST_TICKETS // max(map(len, whole), default=1), 1)
+        for first in range(0, len(whole), most):
+            outcomes |= self._run_whole(prompt, whole[first : first + most])
+        left = [places for places in bodies.values() if places[0] not in outcomes]
+        for turn in range(max(map(len, left), default=0)):
+            wave = [places[turn] for places in left if turn < len(places)]
             outcomes.update(zip(wave, self.run([prompt[place] for place in wave]), strict=True))
         return [outcomes[place] for place in range(len(prompt))]
+
+    def _run_whole(self, prompt: Sequence[Ticket], bodies: Sequence[Sequence[int]]) -> dict[int, Outcome | EngineError]:
+        """The outcomes of these bodies' tickets, by their places; none where the model fails: then one at a time."""
+        start = time.perf_counter()
+        try:
+            told = self.engine.run_sequences([[prompt[place] for place in places] for places in bodies])
+        except EngineError:
+            return {}
+        except Exception:  # whatever it is, it must not stop the loop
+            log.exception("the frames of %d bodies could not be run together", len(bodies))
+            return {}
+        run = Run(sum(map(len, bodies)), time.perf_counter() - start, 0.0)
+        for watcher in self._watchers:
+            watcher(run)
+        pairs = zip(bodies, told, strict=True)
+        return {place: outcome for places, outcomes in pairs for place, outcome in zip(places, outcomes, strict=True)}
 
     def release(self, slot: int) -> None:
         """Free a slot once its tickets have run."""

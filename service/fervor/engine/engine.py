@@ -5,19 +5,20 @@ depend on what else is in its batch: the model was checked for that at start-up,
 """
 
 from collections.abc import Iterator, Sequence
-from math import isfinite, isnan
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from fervor.emotions import EMOTIONS
 from fervor.engine.history import NO_HISTORY
 from fervor.engine.memory import BatchMemory, States
-from fervor.engine.posing import Poses, adapt_all, arrived, between, hold, on_the_way, reject_jumps
+from fervor.engine.posing import Poses, adapt_all, hold, reject_jumps
+from fervor.engine.sequences import is_sequence, run_sequences
 from fervor.engine.slots import Slots
+from fervor.engine.stepping import blend, emotions_at, poses_at, spoken
 from fervor.errors import EngineError
-from fervor.model import Floats, Model, Outputs
+from fervor.model import Floats, Model
 from fervor.session.checkpoint import Memory
 from fervor.session.events import Outcome, Step, Ticket
 from fervor.session.lanes import LANES, NO_LANES, lane_plan
@@ -63,6 +64,21 @@ class Engine:
                 return [error]
             return [outcome for ticket in tickets for outcome in self.run([ticket])]
 
+    def is_sequence(self, tickets: Sequence[Ticket]) -> bool:
+        """Whether tickets of one slot, in their order, may run together: see `run_sequences`."""
+        return self._row_multiple == 1 and is_sequence(tickets, self._plan)
+
+    def run_sequences(self, bodies: Sequence[Sequence[Ticket]]) -> list[list[Outcome]]:
+        """The outcomes of each body's tickets, as of one `run` after the other.
+
+        Args:
+            bodies: of each the tickets, in order, which `is_sequence`.
+
+        Raises:
+            EngineError: the model failed on one of them; nothing was done.
+        """
+        return run_sequences(bodies, self.model, self.slots, self._plan)
+
     def _run(self, tickets: Sequence[Ticket]) -> list[Outcome]:
         rows = np.array([ticket.slot for ticket in tickets], np.intp)  # [ticket] slot
         fresh = [ticket.slot for ticket in tickets if ticket.fresh]
@@ -105,7 +121,11 @@ class Engine:
             restart = np.flatnonzero(restarts if running is None else restarts.take(running))
         said, states = self._call(*inputs, memory.take(at, restart))
         memory.put(at, states)
-        blended = _blend(said, weight, running)
+        if running is not None:
+            by_lane = np.zeros((weight.size, said.shape[1]))
+            by_lane[running] = said
+            said = by_lane
+        blended = blend(said.reshape(*weight.shape, -1), weight)
         if turn.windows:
             stateful = plan.runs.take(place, axis=0).any(axis=1)
             memory.said[turn.tickets[stateful]] = blended[stateful]
@@ -130,7 +150,7 @@ class Engine:
                 np.repeat(turn.emotion[numbers][:, None], length, axis=1),
                 self.model.zero_states(len(numbers)),
             )
-            memory.said[rows] = _said(outputs, slice(None), -1)
+            memory.said[rows] = spoken(outputs.intensity[:, -1], outputs.intensity_by_emotion[:, -1])
 
     def _call(
         self,
@@ -144,7 +164,7 @@ class Engine:
         spare = -count % self._row_multiple
         if not spare:
             outputs = self.model.run(rotations[:, None], mask[:, None], emotion[:, None], states)
-            return _said(outputs, slice(None), 0), outputs.states
+            return spoken(outputs.intensity[:, 0], outputs.intensity_by_emotion[:, 0]), outputs.states
         outputs = self.model.run(
             _pad(rotations, spare)[:, None],
             _pad(mask, spare)[:, None],
@@ -152,7 +172,7 @@ class Engine:
             {name: _pad(state, spare) for name, state in states.items()},
         )
         after = {name: state[:count] for name, state in outputs.states.items()}
-        return _said(outputs, slice(count), 0), after
+        return spoken(outputs.intensity[:count, 0], outputs.intensity_by_emotion[:count, 0]), after
 
 
 class _Turn(NamedTuple):
@@ -196,22 +216,9 @@ def _turn(steps: Sequence[Step], rows: npt.NDArray[np.intp], old: Poses, new: Po
     """Steps of these tickets [step], given the poses of all."""
     whole = len(rows) == len(new.rotations)
     after = new if whole else new.rows(rows)
-    rotations, mask = _at(steps, old if whole else old.rows(rows), after)
-    labels = b"".join([step.label.vector.tobytes() for step in steps])  # sooner done than np.stack
-    emotion = np.frombuffer(labels, np.float32).reshape(len(steps), len(EMOTIONS))
+    rotations, mask = poses_at(steps, old if whole else old.rows(rows), after)
     places = [step.lanes for step in steps]
-    return _Turn(rows, steps, places, NO_LANES in places, rotations, mask, emotion)
-
-
-def _at(steps: Sequence[Step], old: Poses, new: Poses) -> tuple[Floats, Floats]:
-    """Rotations and mask at steps between these poses [step]; see `between`."""
-    fraction, held = [step.fraction for step in steps], [step.held for step in steps]
-    if True not in held:
-        if max(fraction) < 1.0:
-            return on_the_way(old, new, np.array(fraction))
-        if min(fraction) >= 1.0:  # as of sensors that keep the grid's time
-            return arrived(new)
-    return between(old, new, np.array(fraction), np.array(held))
+    return _Turn(rows, steps, places, NO_LANES in places, rotations, mask, emotions_at(steps))
 
 
 def _believed(
@@ -223,34 +230,6 @@ def _believed(
         return came, None, [0] * len(tickets)
     came, counts, rejected = reject_jumps(came, old, jumps, np.array(noisy))
     return came, counts, np.count_nonzero(rejected, axis=1).tolist() if rejected.any() else [0] * len(tickets)
-
-
-def _said(outputs: Outputs, rows: slice, time: int) -> npt.NDArray[np.float64]:
-    """Intensity, and that under every emotion, at one time: [row, 1 + emotion].
-
-    Raises:
-        EngineError: an intensity that is not finite.
-    """
-    intensity, by_emotion = outputs.intensity[rows, time, None], outputs.intensity_by_emotion[rows, time]
-    if not isfinite(np.add.reduce(intensity, axis=None)):  # one that is not makes the sum so
-        raise EngineError("the model gave an intensity that is not finite; the body starts anew")
-    return np.concatenate((intensity, by_emotion), axis=1, dtype=np.float64)
-
-
-def _blend(
-    said: npt.NDArray[np.float64],  # [row, k]
-    weight: npt.NDArray[np.float64],  # [step, lane]
-    running: npt.NDArray[np.intp] | None,  # [row] step · LANES + lane; None: all
-) -> npt.NDArray[np.float64]:
-    """What the lanes of each step say, weighted into one: [step, k]."""
-    if running is None:
-        by_lane = said
-    else:
-        by_lane = np.zeros((weight.size, said.shape[1]))
-        by_lane[running] = said
-    by_lane *= weight.reshape(-1, 1)
-    blended: npt.NDArray[np.float64] = np.add.reduce(by_lane.reshape(*weight.shape, -1), axis=1)
-    return blended
 
 
 def _outcomes(tickets: Sequence[Ticket], slots: Slots, memory: BatchMemory, jumped: Sequence[int]) -> list[Outcome]:

@@ -71,7 +71,15 @@ class Following:
 
     # --- frames -------------------------------------------------------------------------------------------------------
 
-    def frame(self, frame: AnyFrame, read: Read | None = None, group: int | None = None, place: int = 0) -> list[Event]:
+    def frame(
+        self,
+        frame: AnyFrame,
+        read: Read | None = None,
+        group: int | None = None,
+        place: int = 0,
+        *,
+        keep: bool = True,
+    ) -> list[Event]:
         """The work of one frame. A bad one is told and leaves no trace.
 
         Args:
@@ -79,9 +87,10 @@ class Following:
             read: its pose, where it was read already.
             group: of the message, if it has several.
             place: in it.
+            keep: whether a checkpoint may go with it.
         """
         try:
-            events = self._plan(frame, read, group, place)
+            events = self._plan(frame, read, group, place, keep=keep)
         except FervorError as error:
             self._counts["rejected"] += 1
             events = [Reply(refusal(error, frame))]
@@ -98,13 +107,14 @@ class Following:
             raise FrameError(f"a message has {len(frames)} frames; this service takes at most {most}")
         group, agreement = self._groups.open(), self.agreement
         events: list[Event] = []
+        last = _last_of_bodies(frames)
         for place, frame in enumerate(frames):
-            events += self.frame(frame, poses[place] if poses else None, group, place)
+            events += self.frame(frame, poses[place] if poses else None, group, place, keep=place in last)
         if self.agreement is not agreement:  # calibrated: the rest of the message is answered before that is told
             events += self.checkpoints(group)
         return events + self._close_group(group)
 
-    def _plan(self, frame: AnyFrame, read: Read | None, group: int | None, place: int) -> list[Event]:
+    def _plan(self, frame: AnyFrame, read: Read | None, group: int | None, place: int, *, keep: bool) -> list[Event]:
         agreement, host, calibrator, name = self.agreement, self._host, self._calibrator, frame.body
         time = agreement.time_of(frame) if frame.t is None else frame.t
         pose = agreement.pose_of(_plain(frame)) if read is None else read
@@ -127,7 +137,7 @@ class Following:
             pose,
             emotion=frame.emotion,
             group=group,
-            keep=not calibrator.holds(name),
+            keep=keep and not calibrator.holds(name),
             spread=host.spread,
         )
         self._under_way.add(ticket, body, place)
@@ -162,7 +172,7 @@ class Following:
             return ()
         if isinstance(message, LeanFrame):
             body = self._usual(message, poses[0])
-            return () if body is None else (self._plan_usual(message, poses[0], body, None),)
+            return () if body is None else (self._plan_usual(message, poses[0], body, None, keep=True),)
         if len(message.frames) > min(MOST_PROMPT, self._host.limits.max_frames_per_message):
             return ()
         newest: dict[str, int] = {}
@@ -173,8 +183,9 @@ class Following:
                 return ()
             newest[frame.body] = frame.seq
             bodies.append(body)
-        together = zip(message.frames, poses, bodies, strict=True)
-        return [self._plan_usual(frame, pose, body, 0) for frame, pose, body in together]
+        last = _last_of_bodies(message.frames)
+        together = enumerate(zip(message.frames, poses, bodies, strict=True))
+        return [self._plan_usual(frame, pose, body, 0, keep=place in last) for place, (frame, pose, body) in together]
 
     def _usual(self, frame: LeanFrame, read: Read) -> Body | None:
         """The body of a frame, where both are as they mostly are."""
@@ -185,13 +196,13 @@ class Following:
         body = self._roster.find(frame.body, frame.t)
         return None if body is None or frame.seq <= body.newest_seq else body
 
-    def _plan_usual(self, frame: LeanFrame, pose: Read, body: Body, group: int | None) -> Ticket:
+    def _plan_usual(self, frame: LeanFrame, pose: Read, body: Body, group: int | None, *, keep: bool) -> Ticket:
         spread = self._host.spread
         if spread is not None:
             spread.note()
         assert frame.t is not None  # as of a usual frame
         assert not isinstance(pose, FrameError)
-        ticket = body.plan(frame.seq, frame.t, pose, emotion=frame.emotion, group=group, spread=spread)
+        ticket = body.plan(frame.seq, frame.t, pose, emotion=frame.emotion, group=group, keep=keep, spread=spread)
         self._note(ticket)
         return ticket
 
@@ -354,6 +365,11 @@ class Following:
             return []
         self._calibrated[ticket] = group
         return self.checkpoints(group)
+
+
+def _last_of_bodies(frames: Sequence[AnyFrame]) -> set[int]:
+    """The places of each body's last frame in a message: with that its checkpoint goes, if one is due."""
+    return set({frame.body: place for place, frame in enumerate(frames)}.values())
 
 
 def _is_known(emotion: str | Mapping[str, float]) -> bool:
