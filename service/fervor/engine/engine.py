@@ -5,7 +5,6 @@ depend on what else is in its batch: the model was checked for that at start-up,
 """
 
 from collections.abc import Iterator, Sequence
-from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from fervor.engine.history import NO_HISTORY
 from fervor.engine.memory import BatchMemory, States
+from fervor.engine.outcomes import outcomes_of
 from fervor.engine.posing import Poses, adapt_all, hold, reject_jumps
 from fervor.engine.sequences import is_sequence, run_sequences
 from fervor.engine.slots import Slots
@@ -100,7 +100,7 @@ class Engine:
             raise
         memory.keep(came.posed, new, jumps=jumps, hinges=came.hinges)
         memory.store()
-        return _outcomes(tickets, self.slots, memory, jumped)
+        return outcomes_of(tickets, memory.said, memory.records["seen"], jumped, self.slots)
 
     def _run_lanes(self, turn: "_Turn", memory: BatchMemory) -> None:
         """The steps of bodies with recurrent states: a row of the model for every lane that runs."""
@@ -230,22 +230,6 @@ def _believed(
         return came, None, [0] * len(tickets)
     came, counts, rejected = reject_jumps(came, old, jumps, np.array(noisy))
     return came, counts, np.count_nonzero(rejected, axis=1).tolist() if rejected.any() else [0] * len(tickets)
-
-
-def _outcomes(tickets: Sequence[Ticket], slots: Slots, memory: BatchMemory, jumped: Sequence[int]) -> list[Outcome]:
-    """What became of each ticket, from arrays by ticket."""
-    said = memory.said
-    columns = zip(tickets, said[:, 0].tolist(), said[:, 1:], memory.records["seen"].tolist(), jumped, strict=True)
-    return [
-        Outcome(
-            None if isnan(intensity) else intensity,  # nan: no step yet
-            by_emotion,
-            seen,
-            jumps,
-            None if ticket.checkpoint is None else slots.recall(ticket.slot),
-        )
-        for ticket, intensity, by_emotion, seen, jumps in columns
-    ]
 
 
 def _pad(rows: Floats, spare: int) -> Floats:

@@ -7,12 +7,13 @@ of which anything is unusual take the plain way.
 """
 
 from collections.abc import Sequence
-from math import isnan
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from fervor.emotions import EMOTIONS
+from fervor.engine.outcomes import outcomes_of
 from fervor.engine.posing import Poses, adapt_all, hold
 from fervor.engine.slots import Records, Slots
 from fervor.engine.stepping import blend, emotions_at, poses_at, spoken
@@ -63,39 +64,34 @@ def run_sequences(
     """
     batch = _Batch.of(bodies)
     records = slots.read(batch.slots)
-    came = adapt_all(batch.tickets, records["hinges"])
-    old, new = _chained(came.poses, batch, records)
-    steps, whose = batch.steps, batch.whose
-    rotations, mask = poses_at(steps, old.rows(whose), new.rows(whose))
-    inputs = _Inputs(rotations, mask, emotions_at(steps), plan.weight[[step.lanes for step in steps]])
-    said = np.empty((len(steps), records["said"].shape[1]))
-    after = []
-    for these, rows in batch.calls():
-        at = slots.lanes.take(batch.slots.take(these), axis=0).ravel()
-        said[rows], states = _run(model, inputs, rows, slots.take(at))
-        after.append((at, states))
-    for at, states in after:
-        slots.put(at, states)
-    told = batch.told(said, records["said"])
+    came = adapt_all(batch.tickets, records["hinges"])  # of landmark sensors only, which are none of these
+    poses = _chained(came.poses, batch, records)
+    said = _run_all(batch, poses, model, slots, plan)
+    told, last = batch.told(said, records["said"]), batch.last
+    new = poses[1]
     seen = np.add.reduce(new.observed.take(UPPER_BODY, axis=1), axis=1)  # [ticket]
-    last = batch.last
     records["pose"], records["observed"] = new.rotations[last], new.observed[last]
     records["said"], records["seen"] = told[last], seen[last]
     slots.write(batch.slots, records)
-    return batch.by_body(
-        [
-            Outcome(
-                None if isnan(intensity) else intensity,
-                by_emotion,
-                joints,
-                0,
-                None if ticket.checkpoint is None else slots.recall(ticket.slot),
-            )
-            for ticket, intensity, by_emotion, joints in zip(
-                batch.tickets, told[:, 0].tolist(), told[:, 1:], seen.tolist(), strict=True
-            )
-        ]
-    )
+    return batch.by_body(outcomes_of(batch.tickets, told, seen, [0] * len(batch.tickets), slots))
+
+
+def _run_all(
+    batch: "_Batch", poses: tuple[Poses, Poses], model: Model, slots: Slots, plan: LanePlan
+) -> npt.NDArray[np.float64]:
+    """What is said at every step [step, k]; then the lanes are where the last ones left them."""
+    steps, (old, new) = batch.steps, (each.rows(batch.whose) for each in poses)
+    rotations, mask = poses_at(steps, old, new)
+    inputs = _Inputs(rotations, mask, emotions_at(steps), plan.weight[[step.lanes for step in steps]])
+    said = np.empty((len(steps), 1 + len(EMOTIONS)))
+    after = []
+    for bodies, rows in batch.calls():
+        at = slots.lanes.take(batch.slots.take(bodies), axis=0).ravel()
+        said[rows], states = _run(model, inputs, rows, slots.take(at))
+        after.append((at, states))
+    for at, states in after:  # not before all calls have gone well
+        slots.put(at, states)
+    return said
 
 
 class _Inputs(NamedTuple):
@@ -151,7 +147,7 @@ class _Batch(NamedTuple):
             ends=ends,
         )
 
-    def calls(self) -> "list[tuple[Index, Index]]":
+    def calls(self) -> list[tuple[Index, Index]]:
         """For each call of the model, its bodies, of as many steps each, and those steps [body, time]."""
         found = []
         for count in sorted(set(self.counts.tolist())):
