@@ -64,6 +64,7 @@ class QiRobot:
         self._process: subprocess.Popen[str] | None = None
 
     def start(self) -> None:
+        self.calls()  # what one that was killed still said is nobody's
         self._process = subprocess.Popen(
             [sys.executable, str(PROGRAM), str(self.port), json.dumps(self._options)],
             stdin=subprocess.PIPE,
