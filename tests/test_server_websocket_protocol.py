@@ -136,14 +136,15 @@ async def test_pongs_do_not_pile_up_for_a_client_that_reads_nothing(start_servic
             for _ in range(2000):
                 deaf.socket.sendall(piece(PING, b"p" * 100) * 100)
 
-    async with talk(service) as healthy:
-        await healthy.start()
-        flooding = asyncio.create_task(asyncio.to_thread(flood))
-        assert len(await healthy.follow(FRAMES)) == len(FRAMES)
-        await flooding
-        waiting = [c.transport.get_write_buffer_size() for c in live_connections(service)]
-    assert max(waiting) < 200_000  # of 20 MB that were asked for
-    deaf.socket.close()
+    with deaf.socket:
+        async with talk(service) as healthy:
+            await healthy.start()
+            flooding = asyncio.create_task(asyncio.to_thread(flood))
+            assert len(await healthy.follow(FRAMES)) == len(FRAMES)
+            await flooding
+            waiting = [c.transport.get_write_buffer_size() for c in live_connections(service)]
+    # Of 20 MB that were asked for: what it takes to count as stuck, and the answers to what one read brings.
+    assert max(waiting) <= 65_536 + 262_144
 
 
 def live_connections(service: Live) -> list:
