@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bodies import model, motion, terms
 from fervor.engine.batcher import Batcher
 from fervor.engine.engine import Engine
-from fervor.engine.sequences import MOST_ROWS, MOST_STEPS
+from fervor.engine.sequences import MOST_ROWS, LONGEST
 from fervor.errors import EngineError
 from fervor.model import Model, check_row_independence
 from fervor.session.body import Body
@@ -151,7 +151,7 @@ def unusual() -> dict[str, object]:
             *tickets[1:],
         ],
         "without a step": lambda tickets: [but(each, steps=()) for each in tickets],
-        "of many steps": lambda tickets: [but(each, steps=each.steps * MOST_STEPS) for each in tickets],
+        "of many steps": lambda tickets: [but(each, steps=each.steps * LONGEST) for each in tickets],
         "where a lane restarts": lambda tickets: [
             but(each, steps=tuple(but(step, lanes=3) for step in each.steps)) for each in tickets
         ],
@@ -198,4 +198,4 @@ def test_a_fault_of_ours_costs_the_short_way_only(monkeypatch, caplog):
 def test_the_proof_at_start_up_covers_a_call():
     covered = {name: of.default for name, of in inspect.signature(check_row_independence).parameters.items()}
     assert covered["together"] >= MOST_ROWS
-    assert covered["largest"] * covered["frames"] >= MOST_ROWS * MOST_STEPS
+    assert covered["largest"] * covered["frames"] >= MOST_ROWS * LONGEST

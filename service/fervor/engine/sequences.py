@@ -26,7 +26,7 @@ from fervor.skeletons.rig import UPPER_BODY
 MOST_ROWS = 40
 """Rows in one call: no more than what a model was checked for at its start."""
 
-MOST_STEPS = 32
+LONGEST = 32
 """Steps of a body in one call, likewise."""
 
 Index = npt.NDArray[np.intp]
@@ -38,7 +38,7 @@ def is_sequence(tickets: Sequence[Ticket], plan: LanePlan) -> bool:
     A checkpoint may be asked for with the last one only: what the slot holds in between is nowhere.
     """
     source, places = tickets[0].source, [step.lanes for ticket in tickets for step in ticket.steps]
-    if isinstance(source.skeleton, Landmarks) or source.skeleton.noisy or not 0 < len(places) <= MOST_STEPS:
+    if isinstance(source.skeleton, Landmarks) or source.skeleton.noisy or not 0 < len(places) <= LONGEST:
         return False
     for ticket in tickets:
         if ticket.fresh or ticket.pose is None or ticket.source is not source:
