@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bodies import model, motion, terms
 from fervor.engine.batcher import Batcher
 from fervor.engine.engine import Engine
-from fervor.engine.sequences import MOST_ROWS, LONGEST
+from fervor.engine.sequences import LONGEST, MOST_ROWS
 from fervor.errors import EngineError
 from fervor.model import Model, check_row_independence
 from fervor.session.body import Body
